@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator, Mapping
 from decimal import Decimal
 from itertools import combinations, product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from rig.bench.references import exact_coefficients, exact_fall, many_digits
+from rig.bench.references import Number, Values, exact_coefficients, exact_fall, many_digits
 from rig.bench.work import Answer, end_values
 from rig.model import paper
 from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
@@ -16,11 +17,6 @@ from rig.model.fall import fall, kicks
 from rig.model.impact import gamma_finite, impact_on
 from rig.model.surface import Surface
 from rig.units import Quantity
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-
-    from rig.bench.references import Number, Values
 
 PAPER: dict[str, float] = {
     "restitution": paper.BARE.restitution.value, "friction": paper.BARE.friction.value,

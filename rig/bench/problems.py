@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import linalg, optimize
 
 from rig.analysis.adjust import least_squares
@@ -22,12 +24,7 @@ from rig.model.drag import drag_fall, drag_leg, fallen, falling_speed
 from rig.model.fall import fall, kicks
 from rig.model.impact import impact_on
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 KAPPA = 0.06
 """κ of the air, 1/m: a terminal speed of 13 m/s."""

@@ -9,16 +9,14 @@ from __future__ import annotations
 import decimal
 import math
 import sys
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from decimal import Decimal
 from itertools import accumulate
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import mpmath
 from mpmath import mp
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-    from contextlib import AbstractContextManager
 
 Number: TypeAlias = float | Decimal
 Values: TypeAlias = dict[str, Decimal]

@@ -10,23 +10,20 @@ import json
 import os
 import subprocess
 import sys
+from argparse import Namespace
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from rig.bench.figures import scenes_figure
 from rig.bench.findings import Findings
 from rig.errors import RigError
+from rig.protocol.protocol import Protocol
 from rig.protocol.reader import parse
 from rig.streams import say
 from rig.text_table import text_table
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from rig.protocol.protocol import Protocol
 
 PARTS = {
     "surface": {"rig.model.impact", "rig.model.surface",

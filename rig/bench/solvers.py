@@ -7,21 +7,18 @@ implicit ones have the Jacobian.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, get_args
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from rig.bench.work import Answer
 from rig.errors import RigError
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-    Slope = Callable[[Array], Array]
+Array = NDArray[np.float64]
+Slope = Callable[[Array], Array]
 
 Solver = Literal["RK45", "DOP853", "Radau", "BDF", "LSODA"]
 SOLVERS: tuple[Solver, ...] = get_args(Solver)

@@ -9,18 +9,15 @@ from __future__ import annotations
 
 import math
 import statistics
+from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal
 from functools import partial
 from time import process_time
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
+from rig.bench.references import Number, Values
 from rig.errors import RigError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from rig.bench.references import Number, Values
-    from rig.model.fall import Fall
+from rig.model.fall import Fall
 
 T = TypeVar("T")
 EPSILON = 2.0**-52

@@ -9,17 +9,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from rig.campaign.voids import VoidRow, after, why_halted
+from rig.errors import RigError
 from rig.link.messages import RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.reasons import Reason, plain_reason
 from rig.records import Job
 from rig.wordings import NOTE, OPERATOR
-
-if TYPE_CHECKING:
-    from rig.errors import RigError
 
 
 class Stage(StrEnum):

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
+from rig.protocol.protocol import Run
+from rig.reasons import Reason
 from rig.records import Job
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from rig.protocol.protocol import Run
-    from rig.reasons import Reason
-    from rig.session.reading import StateEntry
+from rig.session.reading import StateEntry
 
 ATTEMPTS = 3
 """How often a void run is made before it stays void."""

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
+from rig.campaign.plan import RunLine
 from rig.reasons import Reason, make_reason, remedies, summarize_reasons
 from rig.records import Job
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from rig.campaign.plan import RunLine
-    from rig.session.reading import StateEntry
+from rig.session.reading import StateEntry
 
 MANY = 3
 """Voids of a kind in a row after which it is not the drop that is at fault."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from math import floor, hypot, log2, sqrt
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -11,14 +12,9 @@ from rig.clock.epochs import RESONATOR_TOLERANCE, Epochs, epochs
 from rig.clock.rate import TickRate, ping_rate, pulse_rate
 from rig.clock.samples import HostTime, Samples, one_axis, samples
 from rig.reasons import make_reason
-from rig.records import Pulse
+from rig.records import ClockSample, Drop, HostBreak, Pulse
 from rig.threads import one_thread
 from rig.units import significant
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from rig.records import ClockSample, Drop, HostBreak
 
 HOST_U = 50e-6 / sqrt(3)
 """Of a computer's clock, relative: ±50 ppm for its quartz with temperature and age; a steered one

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.clock.samples import RECV, SEND, TICK, Samples
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
 
 RESONATOR_TOLERANCE = 0.005
 """Genuine Uno and Mega boards clock the AVR from a ceramic resonator, ±0.5 % (Murata CSTCE16M0)."""

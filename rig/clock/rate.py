@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from math import sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from rig.arrays import Array
 from rig.clock.epochs import RESONATOR_TOLERANCE, Epochs
 from rig.clock.samples import RECV, SEND, TICK, Samples
 from rig.clock.wander import Readings, Track
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from numpy.typing import NDArray
-
-    from rig.arrays import Array
-    from rig.records import Pulse
+from rig.records import Pulse
 
 _OUTLIER = 6.0  # robust standard deviations; a sample late by more was not late by chance
 _PASSES = 5

@@ -5,17 +5,14 @@ A night has a hundred thousand of them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from rig.records import ClockSample, HostBreak
+from rig.records import ClockSample, HostBreak
 
 Samples: TypeAlias = "NDArray[np.int64]"
 """Shape (n, 3): `rig.records.ClockSample`'s host time before and after, ns, and tick."""

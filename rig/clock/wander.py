@@ -10,15 +10,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from rig.arrays import Array, Index
-
+from rig.arrays import Array, Index
 
 STEADY = 5e-6 / 60.0
 """Walk of a rate nobody saw wander, relative per √s: 5 ppm in an hour, a steady room."""

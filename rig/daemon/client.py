@@ -11,11 +11,12 @@ import json
 import socket
 import struct
 import threading
+from collections.abc import Callable
 from concurrent.futures import Future, wait
 from contextlib import ExitStack, nullcontext, suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 from rig.daemon import rpc
 from rig.daemon.lease import LEASE_S, ControlError
@@ -24,14 +25,10 @@ from rig.daemon.socket_path import check_folder
 from rig.errors import DeviceError, DeviceTimeoutError, RigError
 from rig.reasons import Reason, make_error
 from rig.recorder.interrupts import Interrupts
+from rig.records import Drop
+from rig.session.reading import Reader
+from rig.session.schema import RunState
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rig.records import Drop
-    from rig.session.reading import Reader
-    from rig.session.schema import RunState
 
 HELLO_S = 10.0
 """How long a client waits for the answer to `hello`."""

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import logging
 import os
+from collections.abc import Callable
+from concurrent.futures import Future
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.daemon.client import Client, Line
 from rig.daemon.lease import Lease
@@ -14,13 +16,8 @@ from rig.daemon.socket_path import default_socket
 from rig.daemon.worker import Worker
 from rig.errors import DeviceError, RigError
 from rig.reasons import make_error
+from rig.recorder.interrupts import Interrupts
 from rig.recorder.published import PublishedState
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from concurrent.futures import Future
-
-    from rig.recorder.interrupts import Interrupts
 
 
 class OwnLine(Line):

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import asyncio
-from typing import TYPE_CHECKING, Any, TypeAlias
+from collections.abc import Awaitable, Callable
+from typing import Any, TypeAlias
 
 from rig.daemon import rpc
+from rig.errors import RigError
 from rig.reasons import make_error
 
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
-
-    from rig.errors import RigError
-
-    Message: TypeAlias = rpc.Request | rpc.RpcError
+Message: TypeAlias = rpc.Request | rpc.RpcError
 
 
 HELLO_S = 2.0

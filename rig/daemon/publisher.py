@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Iterable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.daemon import rpc
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from rig.daemon.connection import Connection
-    from rig.recorder.published import PublishedState
+from rig.daemon.connection import Connection
+from rig.recorder.published import PublishedState
 
 _CHANGES_S = 0.004
 """From one message to the next: in a flood a face takes many together; at 5000 edges/s, a frame in

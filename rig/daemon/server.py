@@ -6,9 +6,12 @@ import asyncio
 import logging
 import os
 import signal
+import socket
 import sys
+from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from rig import __version__
 from rig.daemon import rpc
@@ -22,15 +25,9 @@ from rig.errors import InputError
 from rig.files import make_folder, state_folder
 from rig.ports import is_simulated
 from rig.reasons import make_error
+from rig.recorder.published import PublishedState
 
-if TYPE_CHECKING:
-    import socket
-    from collections.abc import Awaitable, Callable, Coroutine, Sequence
-    from pathlib import Path
-
-    from rig.recorder.published import PublishedState
-
-    Onlooker = Callable[[PublishedState], Coroutine[Any, Any, None]]
+Onlooker = Callable[[PublishedState], Coroutine[Any, Any, None]]
 
 log = logging.getLogger(__name__)
 _SWITCH_S = 1e-3

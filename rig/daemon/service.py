@@ -5,9 +5,10 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
+from collections.abc import Callable
 from functools import partial
 from inspect import isawaitable
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import msgspec
 
@@ -23,9 +24,6 @@ from rig.reasons import make_error, plain_reason, read_record
 from rig.recorder.controller import Controller
 from rig.recorder.published import PublishedState
 from rig.session.schema import RunState
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 log = logging.getLogger(__name__)
 _STOP_S = 1.0  # for the board's answer; what is not known by then is said so

@@ -6,8 +6,8 @@ No release is driven, and no drop of anybody is touched.
 from __future__ import annotations
 
 import cmath
+from collections.abc import Mapping, Sequence
 from math import tau
-from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError
 from rig.flash.boards import UNSEEN
@@ -16,12 +16,8 @@ from rig.link.messages import RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.reasons import make_error
 from rig.selftest import checks, line_checks
+from rig.selftest.board import BoardUnderTest, Check, RecordedDrop
 from rig.selftest.findings import fail_if, need
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from rig.selftest.board import BoardUnderTest, Check, RecordedDrop
 
 _WATCH_S = 1.0
 _TRIES = 40

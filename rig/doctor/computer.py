@@ -8,17 +8,13 @@ from __future__ import annotations
 import os
 import re
 import shutil
+from collections.abc import Iterator
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, packages_distributions, requires, version
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from rig.cache.store import CacheFile
 from rig.selftest.findings import fail_if
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from rig.cache.store import CacheFile
 
 ROOM = 200 * 10**6
 """Bytes that should be free: a day of drops takes a few tens of MB, and its log as much again."""

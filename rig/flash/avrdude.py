@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from contextlib import suppress
 from subprocess import DEVNULL, PIPE, STDOUT, Popen, TimeoutExpired
-from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError, InputError
+from rig.flash.boards import Target
+from rig.flash.image import Image
 from rig.link.port import open_port
 from rig.reasons import make_error
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rig.flash.boards import Target
-    from rig.flash.image import Image
 
 _LOOK_S = 0.2
 _CAUSES = {

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import closing
-from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError, InputError
 from rig.flash.avrdude import write_flash
@@ -11,13 +11,9 @@ from rig.flash.boards import TARGETS
 from rig.flash.drive import copy_firmware
 from rig.flash.image import read_image
 from rig.link.client import Device
+from rig.link.messages import Identity
 from rig.link.port import open_port, port_clock
 from rig.reasons import make_error
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rig.link.messages import Identity
 
 
 def flash(

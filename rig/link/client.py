@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING
 
 from rig.boards import LONGEST_RECORD_MS
 from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
+from rig.link.assembly import Assembly
 from rig.link.exchange import Exchange
 from rig.link.frames import DELIMITER
 from rig.link.port import BAUDRATE
 from rig.link.refusals import DeviceRefusedError
+from rig.link.transcript import Incoming
 from rig.reasons import make_error
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rig.link.assembly import Assembly
-    from rig.link.transcript import Incoming
-    from rig.records import ClockSample, Drop
+from rig.records import ClockSample, Drop
 
 BOOT_WAIT_S = 2.0
 """In which every boot loader starts the firmware, if it hears nothing: the Mega's after 0.83 s."""

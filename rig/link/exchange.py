@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 import serial
 
+from rig.clock.host import Clock
 from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.frames import DELIMITER, Frame, encode
+from rig.link.port import Port
 from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Direction, Incoming, Record, Restart, Transcript
 from rig.reasons import make_error
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from rig.clock.host import Clock
-    from rig.link.port import Port
 
 Answer = TypeVar("Answer", bound=wire.DeviceMessage)
 

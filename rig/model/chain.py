@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, pairwise
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from rig.units import Quantity
+from rig.units import Quantity
 
 XI = 4.0
 """Factor from a moment of inertia in units of m L² to ξ."""

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import accumulate, pairwise, product
 from operator import mul
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,10 +17,7 @@ from rig.model.impact import Impact, alpha_inclined, alpha_level, impact_on
 from rig.model.surface import Pile, Surface
 from rig.units import Quantity
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    Columns = dict[str, list[float]]
+Columns = dict[str, list[float]]
 
 LENGTH, DROP, GRAVITY = 1.165, 0.18, 9.81
 RODS, PITCH = 25, LENGTH / 24

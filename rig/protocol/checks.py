@@ -6,17 +6,12 @@ Rules for single keys are in `rig.protocol.keys`; those for the rods of a chain 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
 
 from rig.protocol.contact import lacking_geometry
-from rig.protocol.fields import DEFAULTS
+from rig.protocol.fields import DEFAULTS, Section
+from rig.protocol.protocol import RodChain
 from rig.protocol.yamltree import Sequence
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from rig.protocol.fields import Section
-    from rig.protocol.protocol import RodChain
 
 MOST_RUNS = 100_000
 

@@ -7,14 +7,12 @@ from dataclasses import dataclass, replace
 from itertools import count, pairwise
 from pathlib import Path
 from string import Template
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 from rig.errors import InputError
 from rig.protocol.keys import KEYS
+from rig.protocol.protocol import Protocol, Side
 from rig.protocol.reader import parse
-
-if TYPE_CHECKING:
-    from rig.protocol.protocol import Protocol, Side
 
 Scene = Literal["two-chains", "one-chain", "object", "track", "picket-fence"]
 SCENES: tuple[Scene, ...] = get_args(Scene)

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Collection, Iterable, Iterator
+from typing import NamedTuple
 
 from rig.protocol.contact import touching_heights
 from rig.protocol.fields import Section
 from rig.protocol.protocol import SIDES, RodChain, vocabulary_of
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable, Iterator
-
-    from rig.units import Quantity
+from rig.units import Quantity
 
 CLEARANCE_M = 0.001
 """Least margin around a rod, m: a beam is some millimetres wide, and a hanging chain sways."""

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
-from rig.protocol.fields import UnsoundError
-
-if TYPE_CHECKING:
-    from rig.protocol.fields import Section
-    from rig.protocol.rods import RodValues
+from rig.protocol.fields import Section, UnsoundError
+from rig.protocol.rods import RodValues
 
 
 def place_masses(chain: Section, heights: RodValues) -> RodValues:

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import math
 from itertools import accumulate, pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from rig.protocol.fields import Section
 from rig.protocol.keys import MOST_RODS
 from rig.units import Quantity, format_quantity
-
-if TYPE_CHECKING:
-    from rig.protocol.fields import Section
-
 
 RodValues = tuple[float, ...]
 """A value for each rod, bottom up."""

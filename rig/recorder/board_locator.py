@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError
+from rig.link.messages import Identity
 from rig.reasons import make_error
 from rig.usb.listing import path_of, serial_number_at, serial_ports
-
-if TYPE_CHECKING:
-    from rig.link.messages import Identity
 
 SERIAL_NUMBER = "usb_serial_number"
 """In a session's record of who was there."""

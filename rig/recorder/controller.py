@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.errors import DeviceError, InputError, RigError, SessionError
 from rig.link.messages import TEST_RUN, Identity, RefusalReason
+from rig.link.port import Port
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import fill_url, is_simulated
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_recordable
+from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, error_of, make_error, make_reason, plain_reason
 from rig.recorder import release_test
 from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
@@ -19,15 +22,9 @@ from rig.recorder.interrupts import StoppedError
 from rig.recorder.opening import describe_session, latest_board, latest_states, open_for
 from rig.recorder.published import PublishedState, link_state
 from rig.recorder.recorder import NullSink, Recorder
+from rig.records import Drop
 from rig.session.schema import RunState
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rig.link.port import Port
-    from rig.protocol.protocol import Protocol
-    from rig.records import Drop
-    from rig.session.store import Session
+from rig.session.store import Session
 
 log = logging.getLogger(__name__)
 _VERDICTS = (RunState.ACCEPTED, RunState.MARGINAL, RunState.VOID, RunState.REJECTED)

@@ -6,17 +6,13 @@ certificate vouches for.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from rig.link import messages as wire
 from rig.link.assembly import ALL_GATES, edges
 from rig.link.transcript import Incoming, Record
 from rig.reasons import Reason, reasons_json
+from rig.recorder.published import PublishedState
+from rig.records import Drop, Edge
 from rig.session.schema import RunState
-
-if TYPE_CHECKING:
-    from rig.recorder.published import PublishedState
-    from rig.records import Drop, Edge
 
 _PHASES = dict(zip(wire.Phase, ("idle", "armed", "recording", "storing"), strict=True))
 

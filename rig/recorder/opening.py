@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from rig.errors import SessionError
 from rig.ports import is_simulated, truth_file
 from rig.protocol.plan import runs
+from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, make_error, reasons_json
+from rig.session.reading import Reader, StateEntry
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from rig.protocol.protocol import Protocol
-    from rig.session.reading import Reader, StateEntry
 
 
 def open_for(protocol: Protocol, source: Path, url: str, path: Path) -> Session:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import logging
 import random
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.clock.host import HostWatch, SystemClock
 from rig.errors import DeviceError, SessionError
@@ -13,21 +14,17 @@ from rig.link.client import BOOT_WAIT_S, Device
 from rig.link.messages import Arm, Identity, Phase, pack_label, unpack_label
 from rig.link.port import Port, open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
+from rig.link.transcript import Direction, Record
 from rig.ports import told
 from rig.protocol.measurable import record_ms
+from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, make_error, sentences
 from rig.recorder.feed import StateFeed
 from rig.recorder.interrupts import StoppedError
+from rig.recorder.published import PublishedState
 from rig.records import ClockSample, Drop, Pulse
 from rig.session.schema import RunState
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from rig.link.transcript import Direction, Record
-    from rig.protocol.protocol import Protocol
-    from rig.recorder.published import PublishedState
-    from rig.session.store import Session
+from rig.session.store import Session
 
 log = logging.getLogger(__name__)
 ARM_TIMEOUT_MS = 10_000

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.errors import DeviceError
 from rig.link.messages import TEST_RUN, Phase, pack_label
-from rig.recorder.recorder import arm_order
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from rig.protocol.protocol import Protocol
-    from rig.recorder.recorder import Recorder
+from rig.protocol.protocol import Protocol
+from rig.recorder.recorder import Recorder, arm_order
 
 _LABEL = pack_label(TEST_RUN, 1)
 _TIMEOUT_MS = 1000  # it is fired at once, or never

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import groupby
 from operator import itemgetter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from rig.reasons import make_reason
+from rig.records import Drop
+from rig.recover.rows import Rows
 from rig.session.drop_check import ByteReplay, Fate, check_drop
 from rig.session.rows import drop_of, named_values
-
-if TYPE_CHECKING:
-    from rig.records import Drop
-    from rig.recover.rows import Rows
 
 
 class RecoveredDrop(NamedTuple):

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.errors import SessionError
 from rig.files import read_input
 from rig.ports import is_simulated
+from rig.recover.examine import ExaminedFile
 from rig.session.schema import OLDER, RunState
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    from rig.recover.examine import ExaminedFile
 
 
 def save(examined: ExaminedFile, target: str | Path, protocol: str | None = None) -> list[str]:

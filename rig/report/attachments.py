@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import base64
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterable
+from typing import NamedTuple
 
 from rig.bundle.archive import zip_files
 from rig.bundle.tables import csv_files
 from rig.ready import find_resource
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from rig.records import Drop
-    from rig.results import SessionResults
-    from rig.session.reading import Reader
+from rig.records import Drop
+from rig.results import SessionResults
+from rig.session.reading import Reader
 
 METHOD = "method.md"
 _DATA = 120_000

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 from rig.files import make_folder, write_atomic
-from rig.report.figure import csv_table
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rig.report.figure import Chart
+from rig.report.figure import Chart, csv_table
 
 Kind = Literal["svg", "png", "pdf"]
 KINDS: tuple[Kind, ...] = get_args(Kind)

@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from rig.analysis.result import Measured
-from rig.measurands import MEASURANDS
+from rig.measurands import MEASURANDS, Measurand
 from rig.report.numbers import degrees, fixed, plus_minus
 from rig.text_table import text_table
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-
-    from rig.measurands import Measurand
 
 _NOTHING: Mapping[str, Callable[[Any], Any]] = {}
 

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.analysis.summary import Incline
-from rig.measurands import acceleration_in, averaged
-from rig.report.columns import table_parts
-from rig.report.figure import chart
+from rig.measurands import Measurand, acceleration_in, averaged
+from rig.report.columns import Part, table_parts
+from rig.report.figure import Chart, chart
 from rig.report.parts import means_of, summary_table
 from rig.report.templates import lines, page_html, sentence
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from rig.measurands import Measurand
-    from rig.report.columns import Part
-    from rig.report.figure import Chart
-    from rig.results.together import MeanDifference, TogetherResults
+from rig.results.together import MeanDifference, TogetherResults
 
 
 def shared_lines(results: TogetherResults) -> list[str]:

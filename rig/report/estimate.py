@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rig.estimate.rods import resolution
-from rig.estimate.session import is_identified
-from rig.report.columns import heading_of, records_in, table_parts
+from rig.estimate.alphas import ConditionAlpha
+from rig.estimate.rods import Gain, resolution
+from rig.estimate.session import Coefficient, Coefficients, SessionEstimate, is_identified
+from rig.report.columns import Part, heading_of, records_in, table_parts
 from rig.report.numbers import MINUS, decimals_for, fixed, plus_minus
 from rig.report.templates import lines
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator
-
-    from rig.estimate.alphas import ConditionAlpha
-    from rig.estimate.rods import Gain
-    from rig.estimate.session import Coefficient, Coefficients, SessionEstimate
-    from rig.report.columns import Part
-    from rig.sections import Sections
+from rig.sections import Sections
 
 SYMBOLS = {"alpha": "α", "restitution": "β", "friction": "μ", "pile_restitution": "β of the pile"}
 _TEXT = ("coefficients", "alphas", "end", "impulses", "comparison", "failed")

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from rig.report.figure import Trace, chart
+from rig.estimate.posterior import Posterior
+from rig.estimate.session import SessionEstimate
+from rig.report.figure import Chart, Trace, chart
 from rig.report.looks import MODEL
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from rig.estimate.posterior import Posterior
-    from rig.estimate.session import SessionEstimate
-    from rig.report.figure import Chart
-    from rig.sections import Sections
+from rig.sections import Sections
 
 _STYLES = (("ring", "model"), ("square", "second"), ("mean", "ink"))
 _SHARES = (0.683, 0.95)

@@ -7,18 +7,16 @@ data.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.analysis.result import Measured
 from rig.report import looks
 from rig.report.columns import read_tables, value_at
 from rig.text_table import csv_text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 COLUMN_PT, WIDE_PT = 244.0, 400.0
 """Width of a journal's column, 86 mm, also for telephones, and of a page."""

@@ -3,29 +3,23 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby, pairwise
 from operator import attrgetter, itemgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.analysis.result import GOOD
-from rig.measurands import RELEASE_SKEW, SEPARATION, SPEED, acceleration_in, averaged
+from rig.analysis.session import Analysis
+from rig.analysis.summary import Incline
+from rig.measurands import RELEASE_SKEW, SEPARATION, SPEED, Measurand, acceleration_in, averaged
 from rig.protocol.protocol import Condition
-from rig.report.figure import chart
+from rig.report.figure import Chart, chart
 from rig.report.looks import PARTS, REST
 from rig.report.numbers import fixed, value_of, with_unit
-from rig.report.parts import LABELS, means_of
+from rig.report.parts import LABELS, Bars, means_of
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from rig.analysis.session import Analysis
-    from rig.analysis.summary import Incline
-    from rig.measurands import Measurand
-    from rig.report.figure import Chart
-    from rig.report.parts import Bars
-
-    Groups = list[dict[str, Any]]
+Groups = list[dict[str, Any]]
 
 FEWEST_INCLINES = 3
 """Least number of inclines for a curve; with fewer, runs are shown instead."""

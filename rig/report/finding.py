@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
-from rig.measurands import ACCELERATION, GRAVITY, averaged
+from rig.analysis.session import Analysis
+from rig.analysis.summary import Incline
+from rig.measurands import ACCELERATION, GRAVITY, Measurand, averaged
 from rig.protocol.plan import runs as planned_runs
+from rig.protocol.protocol import Protocol
 from rig.reasons import remedies, summarize_reasons
 from rig.report.numbers import plus_minus
 from rig.report.parts import means_of, summary_incline
 from rig.report.templates import lines, sentence
+from rig.results import SessionResults
 from rig.results.improvements import improvements
+from rig.session.reading import StateEntry
 from rig.session.schema import RunState
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from rig.analysis.session import Analysis
-    from rig.analysis.summary import Incline
-    from rig.measurands import Measurand
-    from rig.protocol.protocol import Protocol
-    from rig.results import SessionResults
-    from rig.session.reading import StateEntry
 
 MOST_NUMBERS = 3
 _REFERENCES = {GRAVITY: "the protocol's gravity", ACCELERATION: "the acceleration without friction"}

@@ -8,16 +8,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from rig.report.figure import chart
+from rig.protocol.protocol import Gate, Gates, InclinedTrack, Protocol
+from rig.report.figure import Chart, chart
 from rig.report.templates import render
 
-if TYPE_CHECKING:
-    from rig.protocol.protocol import Gate, Gates, InclinedTrack, Protocol
-    from rig.report.figure import Chart
-
-    Point = tuple[float, float]
+Point = tuple[float, float]
 
 _SIDES = {"impact": (-1, "line", "second"), "free": (1, "dash", "model")}
 _WIDTH_PT = 530.0

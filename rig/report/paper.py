@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.measurands import SEPARATION, SPEED
 from rig.model import paper
-from rig.report.figure import chart
+from rig.report.figure import Chart, chart
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from rig.report.figure import Chart
-
-    Columns = Mapping[str, list[float]]
+Columns = Mapping[str, list[float]]
 
 _NO_LINE = "No line from just above 0° to arctan μ = 11.3°: the rods would not slide there."
 

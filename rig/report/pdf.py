@@ -7,7 +7,6 @@ import re
 from contextlib import redirect_stdout
 from html import escape
 from io import StringIO
-from typing import TYPE_CHECKING
 
 from rig.errors import InputError
 from rig.files import write_atomic
@@ -23,11 +22,10 @@ except OSError as error:
         "or print the page from a browser",
     ) from error
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
+from collections.abc import Sequence
+from pathlib import Path
 
-    from rig.report.figure import Chart
+from rig.report.figure import Chart
 
 _DRAWN = re.compile(r'(?<=<figure class="fig">).*?(?=<figcaption>)', re.DOTALL)
 

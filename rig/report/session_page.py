@@ -5,35 +5,29 @@ All numbers come from the session's results; nothing is computed here.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import datetime
 from functools import partial
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig import __version__
 from rig.analysis import curves
-from rig.analysis.result import GOOD
+from rig.analysis.result import GOOD, DropResult
+from rig.estimate.session import SessionEstimate
 from rig.measurands import SEPARATION
 from rig.protocol import plan
+from rig.protocol.protocol import Protocol
+from rig.records import Drop
 from rig.report import attachments, estimate, figures, finding, parts, timeline
 from rig.report.falls import fall_figures
+from rig.report.figure import Chart
 from rig.report.numbers import value_of
-from rig.results import improvements, protocol_of
+from rig.report.parts import Bars
+from rig.results import SessionResults, improvements, protocol_of
 from rig.results.whole import notes
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from rig.analysis.result import DropResult
-    from rig.estimate.session import SessionEstimate
-    from rig.protocol.protocol import Protocol
-    from rig.records import Drop
-    from rig.report.figure import Chart
-    from rig.report.parts import Bars
-    from rig.results import SessionResults
-    from rig.sections import Sections
-    from rig.session.reading import Reader
+from rig.sections import Sections
+from rig.session.reading import Reader
 
 
 def session_page(

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
 from xml.etree import ElementTree
 
+from rig.protocol.protocol import Protocol
 from rig.ready import wiring_picture
-
-if TYPE_CHECKING:
-    from rig.protocol.protocol import Protocol
 
 _SVG = "http://www.w3.org/2000/svg"
 _OPTIONAL = re.compile(r"gate-\d+|release-\d+|reference|sync|sense")

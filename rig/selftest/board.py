@@ -5,23 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 from rig.boards import GATES
 from rig.errors import DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.client import Device
+from rig.link.exchange import Answer
 from rig.link.frames import Frame, encode
 from rig.link.messages import TEST_RUN, DisarmReason, Phase, RefusalReason, pack_label, unpack_label
-from rig.link.port import port_clock
+from rig.link.port import Port, port_clock
+from rig.link.transcript import Record
 from rig.reasons import make_error
+from rig.records import Edge
 from rig.selftest.findings import NotPossibleError, fail_if, insist, need, wrong_answer
-
-if TYPE_CHECKING:
-    from rig.link.exchange import Answer
-    from rig.link.port import Port
-    from rig.link.transcript import Record
-    from rig.records import Edge
 
 LABEL = pack_label(TEST_RUN, 1)
 OTHER_LABEL = pack_label(TEST_RUN, 2)

@@ -5,20 +5,17 @@ from __future__ import annotations
 import random
 from itertools import pairwise
 from statistics import median
-from typing import TYPE_CHECKING
 
 from rig.clock.epochs import RESONATOR_TOLERANCE, epochs
 from rig.clock.rate import ping_rate
 from rig.clock.samples import samples
 from rig.link import messages as wire
+from rig.link.exchange import Answer
 from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, Phase, RefusalReason
 from rig.records import ClockSample
 from rig.selftest.board import LABEL, BoardUnderTest
 from rig.selftest.findings import fail_if, insist, need, wrong_answer
-
-if TYPE_CHECKING:
-    from rig.link.exchange import Answer
 
 TIMEOUT_MS = 400
 """Of the order to arm, longer than the patience with a silent host."""

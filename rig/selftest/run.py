@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason
+from rig.link.port import Port
 from rig.selftest import checks, line_checks
 from rig.selftest.board import BoardUnderTest, Check, SelftestOptions
 from rig.selftest.findings import Finding, make_check, need
 from rig.selftest.judge import JudgeBoard
 from rig.selftest.line_checks import TIMEOUT_MS, await_disarming
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from rig.link.port import Port
-
 
 CHECKS: dict[str, Check] = {
     "handshake": checks.identify,

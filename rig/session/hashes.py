@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import sqlite3
 from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from rig.records import Job
 from rig.session.schema import OLDER, TABLES, Row
-
-if TYPE_CHECKING:
-    import sqlite3
 
 HASHED = [name for name in TABLES if name != "hash"]
 

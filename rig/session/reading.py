@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import sqlite3
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -10,7 +11,7 @@ from datetime import datetime
 from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 from rig.boards import GATES
 from rig.errors import SessionError
@@ -21,9 +22,6 @@ from rig.session.faults import translate_errors
 from rig.session.foreign import limit_steps
 from rig.session.rows import RowError, check_row, drop_of, named_values
 from rig.session.schema import TABLES, Row, RunState, read_identity, read_reasons
-
-if TYPE_CHECKING:
-    import sqlite3
 
 T = TypeVar("T")
 Direction = Literal["rx", "tx"]

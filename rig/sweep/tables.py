@@ -4,21 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-from typing import TYPE_CHECKING, Any, BinaryIO
+from collections.abc import Mapping
+from typing import Any, BinaryIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig import __version__
+from rig.protocol.protocol import Protocol
 from rig.sweep.compute import NOTES, Swept
+from rig.sweep.layout import Layout
 from rig.sweep.variables import VARIABLES
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-
-    from rig.protocol.protocol import Protocol
-    from rig.sweep.layout import Layout
 
 _ROWS = 20_000  # made into text together; a whole sweep's would not fit
 _RESULTS = ("separation_m", "speed_m_s", "in_domain", "notes")

@@ -5,16 +5,13 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.errors import InputError
 from rig.model.chain import XI
 from rig.model.impact import BETA, MU
 from rig.protocol.keys import Range, range_of
+from rig.protocol.protocol import Protocol
 from rig.reasons import make_error
-
-if TYPE_CHECKING:
-    from rig.protocol.protocol import Protocol
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,17 +5,15 @@ Keys are bound only here.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from textual.content import Content
 
 from rig.campaign.machine import Stage
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 
 class Action(NamedTuple):

@@ -6,22 +6,19 @@ import asyncio
 import os
 import subprocess
 import sys
+from collections.abc import Callable, Coroutine, Mapping
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.daemon.client import AsyncClient
+from rig.daemon.replica import Replica
 from rig.daemon.socket_path import default_socket, prepare_folder
 from rig.errors import DeviceError, RigError
 from rig.reasons import make_error
 from rig.tui.state import DaemonState, read_state
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Mapping
-    from pathlib import Path
-
-    from rig.daemon.replica import Replica
 
 _AGAIN_S = 0.5
 _BEAT_S = 0.15  # time between heartbeats

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Coroutine
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.campaign import machine as campaign
-from rig.campaign.machine import Stage, effect_failure, step
+from rig.campaign.machine import Effect, Event, Flow, Stage, effect_failure, step
 from rig.errors import DeviceTimeoutError, RigError
+from rig.tui.client import ReconnectingClient
+from rig.tui.follow import Follower
 from rig.tui.model import StopAnswer
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine
-
-    from rig.campaign.machine import Effect, Event, Flow
-    from rig.tui.client import ReconnectingClient
-    from rig.tui.follow import Follower
 
 
 class Driver:

@@ -4,23 +4,19 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from fractions import Fraction
 
 import numpy as np
 
+from rig.analysis.result import DropResult
+from rig.analysis.trajectory import Trajectory
+from rig.arrays import Array
 from rig.errors import DomainError
 from rig.estimate.curves import model_fall
 from rig.protocol.contact import at_contact
+from rig.protocol.protocol import Protocol, RodChain, Run, Side
+from rig.records import Drop
 from rig.report.falls import passages
-
-if TYPE_CHECKING:
-    from fractions import Fraction
-
-    from rig.analysis.result import DropResult
-    from rig.analysis.trajectory import Trajectory
-    from rig.arrays import Array
-    from rig.protocol.protocol import Protocol, RodChain, Run, Side
-    from rig.records import Drop
 
 _POINTS = 120  # points of a curve: two in each column of a wide terminal
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from rig.campaign.machine import Stage
+from rig.tui.model import Model
 from rig.tui.widgets.gates import label
 from rig.tui.widgets.text import duration, plain
-
-if TYPE_CHECKING:
-    from rig.tui.model import Model
 
 
 class NextStep(NamedTuple):

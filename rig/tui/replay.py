@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
+from rig.records import Drop, Edge
 from rig.tui.indicators import Indicators
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rig.records import Drop, Edge
 
 SLOWEST, FASTEST = 2.0**-10, 4.0
 _STEP_S = 0.01

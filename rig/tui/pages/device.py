@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from typing import TYPE_CHECKING
 
 from textual.content import Content
 
 from rig.campaign.machine import Stage
 from rig.report.finding import clock_lines
-from rig.tui.desk import Face
+from rig.tui.desk import Desk, Face
+from rig.tui.model import Model
 from rig.tui.pages.drop import hanging
 from rig.tui.widgets.bars import LINKS
 from rig.tui.widgets.gates import board, label
 from rig.tui.widgets.text import check_line, plain
-
-if TYPE_CHECKING:
-    from rig.tui.desk import Desk
-    from rig.tui.model import Model
 
 
 def face(model: Model, desk: Desk, width: int) -> Face:

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
 
+from textual.app import ComposeResult
 from textual.containers import Vertical
 from textual.content import Content
 
-from rig.tui.actions import BY_NAME, shown_key
-from rig.tui.model import UNDER_WAY, alarm
+from rig.tui.actions import BY_NAME, Action, shown_key
+from rig.tui.model import UNDER_WAY, Model, alarm
 from rig.tui.next_step import next_step
 from rig.tui.widgets.text import Words, link_action, plain
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from textual.app import ComposeResult
-
-    from rig.tui.actions import Action
-    from rig.tui.model import Model
 
 LINKS = {"up": "● link up", "opening": "◌ opening", "down": "✗ link down", "closed": "○ no link"}
 _NAMED = "device", "run", "result", "session", "history"

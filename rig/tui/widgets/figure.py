@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from time import monotonic
-from typing import TYPE_CHECKING
 
-from rig.tui.plotting import draw_picture
+from rig.tui.plotting import Picture, draw_picture
 from rig.tui.widgets.spans import SpanView
-
-if TYPE_CHECKING:
-    from rig.tui.plotting import Picture
 
 PAUSE_S = 0.2
 """Least time between new pictures, s."""

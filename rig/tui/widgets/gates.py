@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from itertools import zip_longest
-from typing import TYPE_CHECKING
 
 from textual.content import Content
 
-from rig.protocol.protocol import SIDES
-
-if TYPE_CHECKING:
-    from rig.protocol.protocol import Gate, Protocol
-    from rig.tui.indicators import Indicators
-    from rig.tui.model import Model
+from rig.protocol.protocol import SIDES, Gate, Protocol
+from rig.tui.indicators import Indicators
+from rig.tui.model import Model
 
 _WIDE = 39
 

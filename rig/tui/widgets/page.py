@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from itertools import zip_longest
-from typing import TYPE_CHECKING
 
+from textual.app import ComposeResult
 from textual.containers import Grid, Horizontal, Vertical, VerticalScroll
 from textual.widgets import Digits
 
+from rig.tui.desk import Desk, Face
 from rig.tui.scale import paint
 from rig.tui.widgets.figure import Figure
 from rig.tui.widgets.spans import SpanView
 from rig.tui.widgets.text import Words
-
-if TYPE_CHECKING:
-    from textual.app import ComposeResult
-
-    from rig.tui.desk import Desk, Face
 
 _FIGURES = 4
 _WIDE, _NORMAL = 160, 100
