@@ -10,6 +10,7 @@ from rig.bundle.archive import sha256
 from rig.measurands import MEASURANDS
 from rig.reasons import sentences
 from rig.session.schema import TABLES
+from rig.text_rows import read_rows
 from rig.text_table import csv_text
 from rig.timers.edge_rows import HEADER, edges_text
 
@@ -25,8 +26,7 @@ _ROWS_OF = {"states.csv: ": "run_state", "pings.csv: ": "ping", "edges.csv: ": "
 """Whose raw records a file has, for the meaning of its columns."""
 
 
-_LINES = Path(__file__).with_name("columns.txt").read_text("utf-8").splitlines()
-_ROWS = dict(line.split(" | ") for line in _LINES if not line.startswith("#"))
+_ROWS = dict(read_rows(__file__, "columns.txt"))
 """The unit by the end of a column's name, which begins with ``_``, and what columns mean."""
 
 

@@ -73,7 +73,7 @@ def _new_place(names: str, text: str) -> Path:
 def _quantity(text: str, dimension: str) -> float:
     """Read a quantity; units, with fractions and decimals, are loaded only for one."""
     units = import_module("rig.units")
-    return float(units.parse(text, units.Dimension[dimension]).value)
+    return float(units.parse(text, units.DIMENSIONS[dimension]).value)
 
 
 def _socket(name: str) -> Any:

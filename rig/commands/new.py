@@ -23,6 +23,7 @@ from rig.report.mounting import mounting_figure
 from rig.report.wiring import wiring_drawing
 from rig.runner import Operator, run_protocol
 from rig.streams import ask, say
+from rig.text_rows import read_rows
 
 _COEFFICIENTS = "coefficients"
 _SIZES = ("gates", "rods", "length", "diameter", "drop", "repeats")
@@ -66,8 +67,7 @@ def _read_answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
     word = _ask(arguments, "scene", "What do you drop?", "object", SCENES)
     scene: Scene = next(name for name in SCENES if name == word)
     answers: dict[str, Any] = {"rods": "1", "length": "", "incline": ""}
-    lines = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
-    rows = [[*map(str.strip, line.split("|"))] for line in lines if not line.startswith("#")]
+    rows = read_rows(__file__)
     fitting = [row for row in rows if not row[0] or scene in row[0].split()]
     for option in {row[1] for row in rows} - {row[1] for row in fitting}:
         if getattr(arguments, option) is not None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rig.errors import InputError
@@ -12,6 +10,7 @@ from rig.model.chain import XI
 from rig.model.impact import BETA, MU
 from rig.protocol.keys import Range, range_of
 from rig.reasons import make_error
+from rig.text_rows import read_rows
 
 if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol
@@ -36,10 +35,8 @@ class Variable:
     label: str
 
 
-_ROWS = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
 VARIABLES = {
-    name: Variable(range_of(key), column, label)
-    for name, key, column, label in (re.split(r" +\| ", row) for row in _ROWS)
+    name: Variable(range_of(key), column, label) for name, key, column, label in read_rows(__file__)
 }
 """By name; ``variables.txt`` has the name, the key of a protocol that has its range, and these."""
 
