@@ -160,9 +160,7 @@ class RecordedSession:
             raise make_error(InputError, "run_unrecorded", path=self._file.path, run=run, runs=runs)
         drop = drops[-1]
         if drop.damage:
-            raise SessionError(
-                f"run {run}, attempt {drop.attempt}: {drop.damage}", "see rig recover SESSION"
-            )
+            raise make_error(SessionError, "drop_damaged", drop=str(drop.job), text=drop.damage)
         ticks, channels, blocked = np.array(drop.edges, np.int64).reshape(-1, 3).T
         return Edges(ticks / calibration(self._file).scale(drop).hz, channels, blocked != 0)
 

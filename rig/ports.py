@@ -6,6 +6,7 @@ from pathlib import Path
 from urllib.parse import SplitResult, parse_qsl, urlencode, urlsplit
 
 from rig.errors import InputError
+from rig.reasons import make_error
 
 SIMULATED = ("sim", "emu")
 """URL schemes behind which no real chain falls."""
@@ -50,10 +51,8 @@ def fill_url(url: str, protocol: Path, session: Path, seed: int | None, before: 
         earlier = _settings(before)
         seed_before = earlier.get("seed", "0")
         if (new := settings.get("seed", seed_before)) != seed_before:
-            raise InputError(
-                f"{session} was simulated with seed {seed_before}: seed {new} means other chains",
-                "leave the seed out to continue it, or give a new session file",
-            )
+            values = {"path": session, "before": seed_before, "seed": new}
+            raise make_error(InputError, "seed_differs", **values)
         settings = earlier | settings
     places = {"protocol": str(protocol.resolve()), "truth": str(truth_file(session))}
     return _with_settings(url, settings, **places, seed="0")
@@ -77,11 +76,8 @@ def check_name(url: str) -> None:
     parts = _split(url)
     extra = parts.netloc + parts.path or (parts.fragment and f"#{parts.fragment}")
     if extra and parts.scheme in SIMULATED:
-        raise InputError(
-            f"{url}: unexpected {extra!r}",
-            f"leave it out; settings stand behind the ?, as in {parts.scheme}://?"
-            f"{_EXAMPLES[parts.scheme]}; a # in a setting is written %23",
-        )
+        example = f"{parts.scheme}://?{_EXAMPLES[parts.scheme]}"
+        raise make_error(InputError, "url_unexpected", url=url, extra=extra, example=example)
 
 
 def read_settings(url: str) -> dict[str, str]:
@@ -117,9 +113,7 @@ def _split(url: str) -> SplitResult:
     try:
         return urlsplit(url)
     except ValueError as error:
-        raise InputError(
-            f"{url} is no port: {error}", "a device path, or a URL such as sim://"
-        ) from None
+        raise make_error(InputError, "not_a_port", port=url, text=error) from None
 
 
 def _settings(url: str) -> dict[str, str]:

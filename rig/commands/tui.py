@@ -11,6 +11,7 @@ from pathlib import Path
 from rig.daemon.socket_path import require_sockets
 from rig.errors import InputError
 from rig.ports import check_name
+from rig.reasons import make_error
 from rig.tui.app import RigApp
 from rig.tui.context import Options, ascii_only
 from rig.tui.keys import read_keys
@@ -21,10 +22,7 @@ def main(arguments: Namespace) -> None:
     options = _options(arguments)
     keys = read_keys(arguments.keys)
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        raise InputError(
-            "rig tui needs a terminal",
-            "without a terminal: rig run PROTOCOL --port URL --session FILE",
-        )
+        raise make_error(InputError, "no_terminal")
     # What is loaded stays: not looking through it for garbage saves a frame its latest 60 ms.
     asyncio.run(_show(RigApp(options, keys, loaded=gc.freeze)))
 

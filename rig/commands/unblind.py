@@ -3,6 +3,7 @@
 from argparse import Namespace
 
 from rig.errors import SessionError
+from rig.reasons import make_error
 from rig.results import kept_back, protocol_of
 from rig.session.store import Session
 
@@ -12,8 +13,6 @@ def main(arguments: Namespace) -> None:
     with Session.open(arguments.session) as session:
         if not kept_back(session, protocol_of(session)):
             when = f"since {session.unblinded}" if session.unblinded else "and never was blind"
-            raise SessionError(
-                f"{arguments.session} is open {when}", "show the results: rig analyze SESSION"
-            )
+            raise make_error(SessionError, "session_open", path=arguments.session, when=when)
         session.unblind()
         print(f"unblinded at {session.unblinded}; results: rig analyze {arguments.session}")

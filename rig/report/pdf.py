@@ -11,17 +11,14 @@ from typing import TYPE_CHECKING
 
 from rig.errors import InputError
 from rig.files import write_atomic
+from rig.reasons import make_error
 from rig.report.canvas import figure_file
 
 try:
     with redirect_stdout(StringIO()):  # it prints links where a library is missing
         from weasyprint import HTML
 except OSError as error:
-    raise InputError(
-        "--pdf: WeasyPrint needs the library Pango, which is not installed",
-        "Debian: sudo apt-get install libpangoft2-1.0-0 libharfbuzz-subset0; "
-        "or print the page from a browser",
-    ) from error
+    raise make_error(InputError, "no_pango") from error
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
