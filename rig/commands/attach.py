@@ -1,8 +1,8 @@
 """``rig attach``."""
 
-from argparse import Namespace
 from pathlib import Path
 
+from rig.commands.output import Arguments
 from rig.errors import InputError
 from rig.files import read_input
 from rig.reasons import make_error
@@ -12,7 +12,7 @@ LARGEST = 1 << 25
 """Bytes; half of what a value of a session file may have."""
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Add a file to a session, for its report."""
     path = arguments.file
     try:

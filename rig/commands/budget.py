@@ -1,6 +1,5 @@
 """``rig analyze --budget``: what the uncertainties of a run are made of."""
 
-from argparse import Namespace
 from functools import partial
 from typing import Any
 
@@ -10,7 +9,7 @@ from rig.analysis.drop import DropCase
 from rig.analysis.result import Measured
 from rig.analysis.session import planned_run
 from rig.cache.entry import recall
-from rig.commands.output import print_data
+from rig.commands.output import Arguments, print_data
 from rig.errors import InputError
 from rig.measurands import Measurand
 from rig.protocol.plan import runs
@@ -24,7 +23,7 @@ SEED = 1
 _LEAST = 0.001  # in the finer unit: less is none
 
 
-def print_budget(session: Reader, outcome: SessionResults, arguments: Namespace) -> None:
+def print_budget(session: Reader, outcome: SessionResults, arguments: Arguments) -> None:
     """Print a run's budget in the session's light, and by itself."""
     asked = arguments.budget, arguments.trials, SEED
     make = partial(budget, session, outcome, *asked)

@@ -1,6 +1,5 @@
 """Making the files of a bundle from its session file, for ``rig export`` and ``rig verify``."""
 
-from argparse import Namespace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
@@ -8,7 +7,7 @@ from typing import NamedTuple
 from rig.analysis.session import Analysis
 from rig.bundle.archive import pack
 from rig.bundle.contents import SESSION, bundle_files, copy_session
-from rig.commands.output import progress, say, tell_damage
+from rig.commands.output import Arguments, progress, say, tell_damage
 from rig.commands.report import make_report
 from rig.files import write_atomic
 from rig.recover.examine import ExaminedFile, examine
@@ -31,7 +30,7 @@ class DerivedBundle(NamedTuple):
     examined: ExaminedFile
 
 
-def write_bundle(arguments: Namespace) -> int:
+def write_bundle(arguments: Arguments) -> int:
     """Write a session as a bundle; the same session gives the same bytes."""
     secret = None
     if arguments.sign is not None:

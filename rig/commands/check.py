@@ -1,9 +1,7 @@
 """``rig check``."""
 
-from argparse import Namespace
-
 from rig.boards import BOARDS
-from rig.commands.output import print_data
+from rig.commands.output import Arguments, print_data
 from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
@@ -11,7 +9,7 @@ from rig.protocol.measurable import check_gates, check_recordable, unmeasurable
 from rig.protocol.protocol import Protocol
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Describe a protocol, or what any protocol may say."""
     if arguments.protocol is None:
         from rig.protocol.reference import page, schema  # noqa: PLC0415 - of no use to a protocol

@@ -1,9 +1,8 @@
 """``rig compare``."""
 
-from argparse import Namespace
 from contextlib import ExitStack
 
-from rig.commands.output import VOID, print_data, progress, say
+from rig.commands.output import VOID, Arguments, print_data, progress, say
 from rig.files import write_atomic
 from rig.report.canvas import write_figure
 from rig.report.comparison import (
@@ -16,7 +15,7 @@ from rig.results.together import TogetherResults, results_together
 from rig.session.store import Session
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Compare sessions with the first of them."""
     together = read_together(arguments)
     lines = difference_lines(together)
@@ -29,14 +28,14 @@ def main(arguments: Namespace) -> None:
         say(f"comparison: {arguments.output}")
 
 
-def analyze_together(arguments: Namespace) -> int:
+def analyze_together(arguments: Arguments) -> int:
     """Print the results of several sessions in one joint fit, as ``rig analyze A B`` does."""
     together = read_together(arguments)
     print_data(together.json(), pooled_lines(together), as_json=arguments.json)
     return VOID if together.void else 0
 
 
-def read_together(arguments: Namespace) -> TogetherResults:
+def read_together(arguments: Arguments) -> TogetherResults:
     """Analyse the sessions of a command line together."""
     with ExitStack() as open_files:
         files = [

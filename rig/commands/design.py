@@ -1,12 +1,11 @@
 """``rig design``."""
 
-from argparse import Namespace
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 from rig.analysis.components import Components, priors
-from rig.commands.output import print_data, say
+from rig.commands.output import Arguments, print_data, say
 from rig.design.cases import cases
 from rig.design.forecast import GateLayout, forecast
 from rig.design.rewriting import rewrite_heights
@@ -27,7 +26,7 @@ from rig.text_table import text_table
 SPACING_M = 0.01
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Predict the uncertainties of a layout, and search for a better layout."""
     protocol = reader.read(arguments.protocol)
     check_measurable(protocol)

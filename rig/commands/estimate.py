@@ -1,10 +1,9 @@
 """``rig estimate``."""
 
-from argparse import Namespace
 from dataclasses import replace
 from typing import Any
 
-from rig.commands.output import print_json, progress, say, tell_damage
+from rig.commands.output import Arguments, print_json, progress, say, tell_damage
 from rig.files import make_folder
 from rig.report.canvas import write_figure
 from rig.report.estimate import estimate_text
@@ -15,7 +14,7 @@ from rig.sections import Sections
 from rig.session.store import Session
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Arguments) -> int:
     """Estimate the parameters of the impacts from a session."""
     with Session.open(arguments.session, readonly=True) as session:
         folder = None if arguments.output is None else make_folder(arguments.output)

@@ -1,8 +1,6 @@
 """``rig flash``."""
 
-from argparse import Namespace
-
-from rig.commands.output import goes_on, say
+from rig.commands.output import Arguments, goes_on, say
 from rig.errors import InputError
 from rig.flash.boards import DRIVE, TARGETS, UNSEEN
 from rig.flash.steps import flash
@@ -10,7 +8,7 @@ from rig.reasons import make_error
 
 
 @goes_on("the firmware may be incomplete; run the same command again")
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Flash a board and say what it is now."""
     board, avrdude, drive = arguments.board, arguments.avrdude, arguments.drive
     if TARGETS[board] is DRIVE and avrdude is not None:

@@ -17,7 +17,7 @@ from rig.analysis.identify import log_evidence, most_votes
 from rig.clock.calibration import TimeScale
 from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.clock.host import SystemClock
-from rig.commands.output import say
+from rig.commands.output import Arguments, say
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_measurable, with_gates
 from rig.protocol.plan import runs
@@ -29,7 +29,6 @@ from rig.timers.moments import TICK_HZ
 from rig.timers.problems import refusal
 
 if TYPE_CHECKING:
-    from argparse import Namespace
     from collections.abc import Iterator, Sequence
 
     from rig.analysis.result import DropResult
@@ -43,7 +42,7 @@ _MOST = 120
 of how long they last, so that those that are least like the others are among them."""
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Make a session from a file, or say how it would be read."""
     protocol = reader.read(arguments.protocol)
     source, events = Path(arguments.protocol).name, Path(arguments.events).name
@@ -76,7 +75,7 @@ def main(arguments: Namespace) -> None:
     say(f"{sum(len(drop.edges) for drop in drops)} edges of {counted} → {arguments.session}")
 
 
-def import_with_protocol(protocol: Protocol, arguments: Namespace) -> Import:
+def import_with_protocol(protocol: Protocol, arguments: Arguments) -> Import:
     """Read the drops of any timer's file as a protocol's falls bear them out."""
     gates = sorted(check_gates(protocol).gates, key=lambda gate: -gate.height)
     bars = max(side.chain.rods for side in protocol.chains.values())

@@ -2,14 +2,13 @@
 
 import sys
 import tempfile
-from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from rig.boards import BOARDS, GATES
-from rig.commands.output import print_results
+from rig.commands.output import Arguments, print_results
 from rig.errors import InputError
 from rig.files import check_new, write_atomic
 from rig.predictions import notes
@@ -34,7 +33,7 @@ _CHOICE = Path(__file__).with_name("choose.txt").read_text("utf-8")
 """What somebody has, the ready protocol for it, and the command; README begins with it too."""
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Arguments) -> int:
     """Write a protocol, draw and describe it, and try it in simulation."""
     path: Path = arguments.output
     places = {word: path.with_name(f"{path.stem}-{word}.svg") for word in ("mounting", "wiring")}
@@ -60,7 +59,7 @@ def main(arguments: Namespace) -> int:
     return _simulate(draft)
 
 
-def _read_answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
+def _read_answers(arguments: Arguments, path: Path) -> tuple[str, Draft]:
     """Return the board and the draft; ask for what the command line leaves open."""
     if arguments.scene is None and _can_ask(arguments):
         say(f"What have you got?\n{_CHOICE.replace('`', '')}")
@@ -84,11 +83,11 @@ def _read_answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
     return answers["board"], Draft(title=title, scene=scene, inclines=inclines, **sizes)
 
 
-def _can_ask(arguments: Namespace) -> bool:
+def _can_ask(arguments: Arguments) -> bool:
     return not arguments.yes and sys.stdin.isatty()
 
 
-def _ask(arguments: Namespace, option: str, words: str, usual: str, accepted: Sequence[str]) -> str:
+def _ask(arguments: Arguments, option: str, words: str, usual: str, accepted: Sequence[str]) -> str:
     """Return the answer of the command line or of the user, or the default.
 
     `accepted` is empty where any answer is.

@@ -1,7 +1,6 @@
 """``rig notes``."""
 
-from argparse import Namespace
-
+from rig.commands.output import Arguments
 from rig.errors import InputError
 from rig.reasons import make_error, plain_reason
 from rig.report.numbers import ranges
@@ -9,7 +8,7 @@ from rig.session.store import Session
 from rig.wordings import NOTE
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Add a note to a recorded run; its verdict stays."""
     with Session.open(arguments.session) as session:
         last = session.latest_state(arguments.run)

@@ -1,9 +1,10 @@
-"""Results to stdout, narration to stderr."""
+"""What every command uses: its arguments; results to stdout, narration to stderr."""
 
 from __future__ import annotations
 
 import json
 import sys
+from argparse import Namespace
 from contextlib import contextmanager
 from shutil import get_terminal_size
 from textwrap import wrap
@@ -14,13 +15,22 @@ from rig.streams import say as narrate
 from rig.streams import tolerate_broken
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from rig.analysis.session import Analysis
     from rig.results import SessionResults
     from rig.selftest.findings import Finding
 
 VOID = 3
+
+
+class Arguments(Namespace):
+    """What a command line says: each argument by its name in ``command_help.txt``."""
+
+    session: str
+    further: Sequence[str]
+    fresh: bool
+    json: bool
 
 
 def say(line: str) -> None:

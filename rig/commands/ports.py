@@ -1,12 +1,11 @@
 """``rig ports``."""
 
-from argparse import Namespace
 from collections import Counter
 from collections.abc import Mapping
 from contextlib import closing
 from typing import Any
 
-from rig.commands.output import print_data, say
+from rig.commands.output import Arguments, print_data, say
 from rig.errors import DeviceError
 from rig.flash.drive import sees_boot_pico, waiting_drives
 from rig.link.client import Device
@@ -15,7 +14,7 @@ from rig.reasons import make_reason
 from rig.usb.listing import SerialPort, serial_ports
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """List the ports, and ask who is there where that is wanted."""
     ports = serial_ports()
     chosen = arguments.identify

@@ -1,6 +1,5 @@
 """``rig predict``."""
 
-from argparse import Namespace
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -8,7 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from rig.analysis.distributions import COVERAGE_95
-from rig.commands.output import print_data, say
+from rig.commands.output import Arguments, print_data, say
 from rig.files import write_atomic
 from rig.measurands import SEPARATION, SPEED, Measurand
 from rig.model.prediction import PredictedIncline
@@ -20,7 +19,7 @@ from rig.report.numbers import degrees, fixed
 from rig.text_table import csv_text
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Print the model's predictions, one an incline, or draw a figure of the paper."""
     if arguments.figure is not None:
         _write_figure(arguments.figure, arguments.output)

@@ -1,15 +1,13 @@
 """``rig ready``."""
 
-from argparse import Namespace
-
-from rig.commands.output import say
+from rig.commands.output import Arguments, say
 from rig.files import check_new, write_atomic
 from rig.protocol import reader
 from rig.ready import ready_protocol, ready_protocols
 from rig.text_table import text_table
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """List the ready protocols, or copy one into this folder."""
     if arguments.name is None:
         rows = [[name, reader.read(path).title] for name, path in ready_protocols().items()]

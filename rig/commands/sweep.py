@@ -2,11 +2,10 @@
 
 import sys
 import time
-from argparse import Namespace
 from importlib import import_module
 from pathlib import Path
 
-from rig.commands.output import goes_on, say, stage
+from rig.commands.output import Arguments, goes_on, say, stage
 from rig.errors import InputError
 from rig.files import replacing
 from rig.protocol import reader
@@ -19,7 +18,7 @@ from rig.sweep.layout import Layout, lay_out
 from rig.sweep.tables import provenance, write_csv, write_npz
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Compute a sweep and write it to a file."""
     output: Path = arguments.output
     protocol = reader.read(arguments.protocol)

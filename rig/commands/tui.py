@@ -4,10 +4,10 @@ import asyncio
 import gc
 import os
 import sys
-from argparse import Namespace
 from datetime import UTC, datetime
 from pathlib import Path
 
+from rig.commands.output import Arguments
 from rig.daemon.socket_path import require_sockets
 from rig.errors import InputError
 from rig.ports import check_name
@@ -17,7 +17,7 @@ from rig.tui.context import Options, ascii_only
 from rig.tui.keys import read_keys
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Show the session, and carry it out."""
     options = _options(arguments)
     keys = read_keys(arguments.keys)
@@ -46,7 +46,7 @@ async def _show(app: RigApp) -> None:
         raise asyncio.CancelledError
 
 
-def _options(arguments: Namespace) -> Options:
+def _options(arguments: Arguments) -> Options:
     if arguments.protocol:
         files: tuple[Path, ...] = (Path(arguments.protocol),)
     else:

@@ -1,14 +1,13 @@
 """``rig unblind``."""
 
-from argparse import Namespace
-
+from rig.commands.output import Arguments
 from rig.errors import SessionError
 from rig.reasons import make_error
 from rig.results import kept_back, protocol_of
 from rig.session.store import Session
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Record that a blind session's numbers may be seen from now on."""
     with Session.open(arguments.session) as session:
         if not kept_back(session, protocol_of(session)):

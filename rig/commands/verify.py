@@ -1,13 +1,12 @@
 """``rig verify``."""
 
 import json
-from argparse import Namespace
 from collections.abc import Iterator, Mapping
 
 from rig.bundle.archive import PUBLIC_KEY, SIGNATURE, is_bundle, read_bundle
 from rig.bundle.contents import ENVIRONMENT, HISTORY, SESSION, WRONG, compare
 from rig.commands.bundling import derive_bundle, describe_history
-from rig.commands.output import VOID, progress, show
+from rig.commands.output import VOID, Arguments, progress, show
 from rig.errors import InputError, SessionError
 from rig.reasons import make_error
 from rig.recover.examine import FAULTS, describe, examine
@@ -15,7 +14,7 @@ from rig.results import results
 from rig.session.store import Session
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Arguments) -> int:
     """Check a bundle, the folder that it was unpacked into, or a session file."""
     check = _check_bundle if is_bundle(arguments.file) else _check_session
     findings = dict.fromkeys(check(arguments.file, arguments.key))
