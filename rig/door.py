@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
 
 from rig.analysis.result import GOOD, DropResult, Measured, optional_package
 from rig.bundle.tables import column_unit, result_tables
-from rig.errors import InputError, SessionError
+from rig.errors import InputError
 from rig.measurands import MEASURANDS
 from rig.model.prediction import PredictedIncline
 from rig.predictions import predictions
 from rig.protocol import reader
 from rig.ready import find_protocol
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.report.numbers import ranges, with_unit
 from rig.report.parts import means_parts, summary_table
 from rig.report.templates import parts_html
@@ -157,10 +157,10 @@ class RecordedSession:
         drops = [drop for drop in recorded if drop.run == run and attempt in {None, drop.attempt}]
         if not drops:
             runs = ranges("run", [drop.run for drop in recorded])
-            raise make_error(InputError, "run_unrecorded", path=self._file.path, run=run, runs=runs)
+            raise rig_error("run_unrecorded", path=self._file.path, run=run, runs=runs)
         drop = drops[-1]
         if drop.damage:
-            raise make_error(SessionError, "drop_damaged", drop=str(drop.job), text=drop.damage)
+            raise rig_error("drop_damaged", drop=str(drop.job), text=drop.damage)
         ticks, channels, blocked = np.array(drop.edges, np.int64).reshape(-1, 3).T
         return Edges(ticks / calibration(self._file).scale(drop).hz, channels, blocked != 0)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from urllib.parse import SplitResult, parse_qsl, urlencode, urlsplit
 
 from rig.errors import InputError
-from rig.reasons import make_error
+from rig.reasons import rig_error
 
 SIMULATED = ("sim", "emu")
 """URL schemes behind which no real chain falls."""
@@ -51,8 +51,7 @@ def fill_url(url: str, protocol: Path, session: Path, seed: int | None, before: 
         earlier = _settings(before)
         seed_before = earlier.get("seed", "0")
         if (new := settings.get("seed", seed_before)) != seed_before:
-            values = {"path": session, "before": seed_before, "seed": new}
-            raise make_error(InputError, "seed_differs", **values)
+            raise rig_error("seed_differs", path=session, before=seed_before, seed=new)
         settings = earlier | settings
     places = {"protocol": str(protocol.resolve()), "truth": str(truth_file(session))}
     return _with_settings(url, settings, **places, seed="0")
@@ -77,7 +76,7 @@ def check_name(url: str) -> None:
     extra = parts.netloc + parts.path or (parts.fragment and f"#{parts.fragment}")
     if extra and parts.scheme in SIMULATED:
         example = f"{parts.scheme}://?{_EXAMPLES[parts.scheme]}"
-        raise make_error(InputError, "url_unexpected", url=url, extra=extra, example=example)
+        raise rig_error("url_unexpected", url=url, extra=extra, example=example)
 
 
 def read_settings(url: str) -> dict[str, str]:
@@ -113,7 +112,7 @@ def _split(url: str) -> SplitResult:
     try:
         return urlsplit(url)
     except ValueError as error:
-        raise make_error(InputError, "not_a_port", port=url, text=error) from None
+        raise rig_error("not_a_port", port=url, text=error) from None
 
 
 def _settings(url: str) -> dict[str, str]:

@@ -10,9 +10,8 @@ from minisign import Error, PublicKey, SecretKey, Signature
 
 from rig.bundle.archive import PUBLIC_KEY, SIGNATURE, SUMS, list_hashes
 from rig.bundle.contents import WRONG
-from rig.errors import InputError
 from rig.files import read_input
-from rig.reasons import make_error
+from rig.reasons import rig_error
 
 if TYPE_CHECKING:
     import os
@@ -37,7 +36,7 @@ def read_secret(key: str | os.PathLike[str]) -> SecretKey:
         secret = SecretKey.from_bytes(content)
         if secret.is_encrypted():
             if not sys.stdin.isatty():
-                raise make_error(InputError, "key_locked", path=key)
+                raise rig_error("key_locked", path=key)
             secret.decrypt(getpass(f"password of {key}: "))
         return secret
 
@@ -83,7 +82,7 @@ def _read_key(path: str | os.PathLike[str], read: Callable[[bytes], Key]) -> Key
     try:
         return read(read_input(path, _LONGEST))
     except (OSError, Error) as error:
-        raise make_error(InputError, "key_unusable", path=path, text=error) from error
+        raise rig_error("key_unusable", path=path, text=error) from error
 
 
 def _text(part: object) -> bytes:

@@ -3,9 +3,8 @@
 from pathlib import Path
 
 from rig.commands.output import Arguments
-from rig.errors import InputError
 from rig.files import read_input
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.session.store import Session
 
 LARGEST = 1 << 25
@@ -18,9 +17,9 @@ def main(arguments: Arguments) -> None:
     try:
         data = read_input(path, LARGEST + 1)
     except OSError as error:
-        raise make_error(InputError, "attachment_unreadable", path=path, text=error) from error
+        raise rig_error("attachment_unreadable", path=path, text=error) from error
     if not 0 < len(data) <= LARGEST:
-        raise make_error(InputError, "attachment_size", path=path)
+        raise rig_error("attachment_size", path=path)
     with Session.open(arguments.session) as session:
         session.attach(Path(path).name, data)
     print(f"attached to {arguments.session}: {path}, {len(data)} bytes")

@@ -11,13 +11,12 @@ from rig.design.forecast import GateLayout, forecast
 from rig.design.rewriting import rewrite_heights
 from rig.design.search import better, room
 from rig.design.trials import readable, trials, trials_text
-from rig.errors import InputError
 from rig.files import write_atomic
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_measurable
 from rig.protocol.protocol import Protocol
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.report.estimate import symbol
 from rig.report.numbers import decimals_for, fixed
 from rig.report.templates import lines
@@ -37,7 +36,7 @@ def main(arguments: Arguments) -> None:
     components = _read_scatter(learned, protocol) if learned else priors(protocol)
     limits = room(protocol, arguments.lowest, arguments.highest, arguments.spacing or SPACING_M)
     if limits.lowest > limits.highest:
-        raise make_error(InputError, "beams_reversed")
+        raise rig_error("beams_reversed")
     layouts: dict[str, Any] = {
         "runs": len(protocol.plan.inclines) * protocol.plan.repeats,
         "scatter": "learned" if learned else "stated",
@@ -59,10 +58,10 @@ def _read_scatter(path: str, protocol: Protocol) -> Components:
 
     with Session.open(path, readonly=True) as session:
         if (protocol_of(session).surface is None) != (protocol.surface is None):
-            raise make_error(InputError, "scatter_unlike", path=path, protocol=protocol.title)
+            raise rig_error("scatter_unlike", path=path, protocol=protocol.title)
         joint = complete_analysis(session).joint
     if joint is None:
-        raise make_error(InputError, "scatter_unknown", path=path)
+        raise rig_error("scatter_unknown", path=path)
     return joint.components
 
 

@@ -1,8 +1,7 @@
 """``rig notes``."""
 
 from rig.commands.output import Arguments
-from rig.errors import InputError
-from rig.reasons import make_error, plain_reason
+from rig.reasons import plain_reason, rig_error
 from rig.report.numbers import ranges
 from rig.session.store import Session
 from rig.wordings import NOTE
@@ -14,8 +13,7 @@ def main(arguments: Arguments) -> None:
         last = session.latest_state(arguments.run)
         if last is None or session.drop(last.run, last.attempt) is None:
             runs = ranges("run", [drop.run for drop in session.latest_drops()])
-            values = {"path": arguments.session, "run": arguments.run, "runs": runs}
-            raise make_error(InputError, "run_unrecorded", **values)
+            raise rig_error("run_unrecorded", path=arguments.session, run=arguments.run, runs=runs)
         reasons = (*last.reasons, plain_reason(arguments.text, NOTE))
         # The host's clock may have begun anew since the drop: the entry keeps the drop's time.
         session.add_state(last.run, last.attempt, last.state, last.host_ns, reasons)

@@ -6,11 +6,10 @@ from importlib import import_module
 from pathlib import Path
 
 from rig.commands.output import Arguments, goes_on, say, stage
-from rig.errors import InputError
 from rig.files import replacing
 from rig.protocol import reader
 from rig.protocol.protocol import Protocol
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.report.canvas import ENDINGS, write_figure
 from rig.sweep.compute import NO_ANSWER, PILE, Swept, chunk_length, compute
 from rig.sweep.executor import executor
@@ -74,9 +73,9 @@ def _check_drawable(layout: Layout) -> None:
     if layout.layered:
         *first, last = (f"{value:g}" for value in layout.values["incline"])
         inclines = ", ".join([*first, last])
-        raise make_error(InputError, "sweep_of_inclines", inclines=inclines, last=last)
+        raise rig_error("sweep_of_inclines", inclines=inclines, last=last)
     if len(layout.axes) > 2:
-        raise make_error(InputError, "sweep_of_axes", axes=len(layout.axes))
+        raise rig_error("sweep_of_axes", axes=len(layout.axes))
 
 
 def _summary(swept: Swept) -> str:

@@ -9,9 +9,8 @@ from pathlib import Path
 
 from rig.commands.output import Arguments
 from rig.daemon.socket_path import require_sockets
-from rig.errors import InputError
 from rig.ports import check_name
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.tui.app import RigApp
 from rig.tui.context import Options, ascii_only
 from rig.tui.keys import read_keys
@@ -22,7 +21,7 @@ def main(arguments: Arguments) -> None:
     options = _options(arguments)
     keys = read_keys(arguments.keys)
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        raise make_error(InputError, "no_terminal")
+        raise rig_error("no_terminal")
     # What is loaded stays: not looking through it for garbage saves a frame its latest 60 ms.
     asyncio.run(_show(RigApp(options, keys, loaded=gc.freeze)))
 

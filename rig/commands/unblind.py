@@ -1,8 +1,7 @@
 """``rig unblind``."""
 
 from rig.commands.output import Arguments
-from rig.errors import SessionError
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.results import kept_back, protocol_of
 from rig.session.store import Session
 
@@ -12,6 +11,6 @@ def main(arguments: Arguments) -> None:
     with Session.open(arguments.session) as session:
         if not kept_back(session, protocol_of(session)):
             when = f"since {session.unblinded}" if session.unblinded else "and never was blind"
-            raise make_error(SessionError, "session_open", path=arguments.session, when=when)
+            raise rig_error("session_open", path=arguments.session, when=when)
         session.unblind()
         print(f"unblinded at {session.unblinded}; results: rig analyze {arguments.session}")

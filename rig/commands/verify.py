@@ -7,8 +7,8 @@ from rig.bundle.archive import PUBLIC_KEY, SIGNATURE, is_bundle, read_bundle
 from rig.bundle.contents import ENVIRONMENT, HISTORY, SESSION, WRONG, compare
 from rig.commands.bundling import derive_bundle, describe_history
 from rig.commands.output import VOID, Arguments, progress, show
-from rig.errors import InputError, SessionError
-from rig.reasons import make_error
+from rig.errors import SessionError
+from rig.reasons import rig_error
 from rig.recover.examine import FAULTS, describe, examine
 from rig.results import results
 from rig.session.store import Session
@@ -26,7 +26,7 @@ def main(arguments: Arguments) -> int:
 
 def _check_session(path: str, key: str | None) -> Iterator[str]:
     if key is not None:
-        raise make_error(InputError, "key_without_bundle", path=path)
+        raise rig_error("key_without_bundle", path=path)
     examined = examine(path)
     yield from describe(examined)
     with Session.open(path, readonly=True) as session:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from contextlib import closing
 from typing import TYPE_CHECKING
 
-from rig.errors import DeviceError, InputError
 from rig.flash.avrdude import write_flash
 from rig.flash.boards import TARGETS
 from rig.flash.drive import copy_firmware
 from rig.flash.image import read_image
 from rig.link.client import Device
 from rig.link.port import open_port, port_clock
-from rig.reasons import make_error
+from rig.reasons import rig_error
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -55,7 +54,7 @@ def flash(
     if not target.avrdude:
         port = copy_firmware(port, way, file, say)
     elif port is None:
-        raise make_error(InputError, "flash_without_port")
+        raise rig_error("flash_without_port")
     else:
         write_flash(target, port, way, file, say)
     say("written; asking the board who it is")
@@ -63,5 +62,5 @@ def flash(
         identity = Device(opened, port_clock(opened)).connect()
     if (identity.board, identity.firmware) != (target.board.name, file.firmware):
         names = {"board": target.board.one, "answer": f"{identity.board}, {identity.firmware}"}
-        raise make_error(DeviceError, "flashed_other", port=port, firmware=file.firmware, **names)
+        raise rig_error("flashed_other", port=port, firmware=file.firmware, **names)
     return identity

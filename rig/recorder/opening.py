@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from rig.errors import SessionError
 from rig.ports import is_simulated, truth_file
 from rig.protocol.plan import runs
-from rig.reasons import Reason, make_error, reasons_json
+from rig.reasons import Reason, reasons_json, rig_error
 from rig.session.store import Session
 
 if TYPE_CHECKING:
@@ -41,7 +40,7 @@ def open_for(protocol: Protocol, source: Path, url: str, path: Path) -> Session:
         code, values = "session_mixed", values | {"recorded": recorded, "port": url, "kind": kind}
     if code:
         session.close()
-        raise make_error(SessionError, code, **values)
+        raise rig_error(code, **values)
     return session
 
 

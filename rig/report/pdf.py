@@ -9,16 +9,15 @@ from html import escape
 from io import StringIO
 from typing import TYPE_CHECKING
 
-from rig.errors import InputError
 from rig.files import write_atomic
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.report.canvas import figure_file
 
 try:
     with redirect_stdout(StringIO()):  # it prints links where a library is missing
         from weasyprint import HTML
 except OSError as error:
-    raise make_error(InputError, "no_pango") from error
+    raise rig_error("no_pango") from error
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

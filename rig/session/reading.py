@@ -13,8 +13,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 
 from rig.boards import GATES
-from rig.errors import SessionError
-from rig.reasons import Reason, make_error
+from rig.reasons import Reason, rig_error
 from rig.records import ClockSample, Drop, HostBreak, Job, Pulse
 from rig.session.drop_check import ByteReplay, check_drop
 from rig.session.faults import translate_errors
@@ -24,6 +23,8 @@ from rig.session.schema import TABLES, Row, RunState, read_identity, read_reason
 
 if TYPE_CHECKING:
     import sqlite3
+
+    from rig.errors import RigError
 
 T = TypeVar("T")
 Direction = Literal["rx", "tx"]
@@ -116,7 +117,7 @@ class Reader:
     def connection(self) -> sqlite3.Connection:
         """The open SQLite connection."""
         if self._connection is None:
-            raise make_error(SessionError, "session_closed", path=self.path)
+            raise rig_error("session_closed", path=self.path)
         return self._connection
 
     def digest(self) -> str | None:
@@ -290,8 +291,8 @@ class Reader:
         # No other value of the row can be trusted.
         return Drop(row[1], row[2], tick_hz=1, edges=(), damage=why)
 
-    def _damage(self, text: str) -> SessionError:
-        return make_error(SessionError, "session_wrong", path=self.path, text=text)
+    def _damage(self, text: str) -> RigError:
+        return rig_error("session_wrong", path=self.path, text=text)
 
     def _edges(self, row: Row) -> list[Row]:
         number, events = row[0], named_values(row)["events"]

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from rig.errors import InputError
 from rig.model.chain import XI
 from rig.model.impact import BETA, MU
 from rig.protocol.keys import Range, range_of
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.text_rows import read_rows
 
 if TYPE_CHECKING:
@@ -54,9 +53,9 @@ def scene_values(protocol: Protocol) -> dict[str, tuple[float, ...]]:
         If nothing is struck in this scene, or it has air.
     """
     if protocol.surface is None:
-        raise make_error(InputError, "sweep_of_no_surface", protocol=protocol.source)
+        raise rig_error("sweep_of_no_surface", protocol=protocol.source)
     if protocol.drag is not None:
-        raise make_error(InputError, "sweep_in_air", protocol=protocol.source)
+        raise rig_error("sweep_in_air", protocol=protocol.source)
     chain = next(iter(protocol.chains.values())).chain
     stated: dict[str, tuple[float, ...]] = {}
     values: dict[str, float | None] = {}
