@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from collections import Counter
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
@@ -22,6 +21,7 @@ from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_measurable, with_gates
 from rig.protocol.plan import runs
 from rig.reasons import make_reason, reasons_json
+from rig.report.templates import lines
 from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.timers.importing import FallMatch, Import, import_drops
@@ -29,7 +29,7 @@ from rig.timers.moments import TICK_HZ
 from rig.timers.problems import refusal
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from rig.analysis.result import DropResult
     from rig.protocol.protocol import Protocol
@@ -52,7 +52,7 @@ def main(arguments: Arguments) -> None:
     for note in imported.notes:
         say(note.text)
     if arguments.dry_run:
-        print("\n".join([*imported.lines, *_describe_drops(drops)]))
+        print("\n".join([*imported.lines, *lines("imported", drops)]))
         return
     if arguments.session is None:
         raise refusal("--session", "no_session_file")
@@ -113,15 +113,6 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
         text += f"; g {sum(gravity) / len(gravity):.2f} m/s²"
     check = check_gravity(protocol, results)
     return FallMatch(*min(shares), evidence, text, check.doubts if check else ())
-
-
-def _describe_drops(drops: Sequence[Drop]) -> Iterator[str]:
-    """Describe what would be imported, a line a run."""
-    for drop in drops:
-        by_channel = Counter(edge.channel for edge in drop.edges)
-        counts = ", ".join(f"{channel}: {n}" for channel, n in sorted(by_channel.items()))
-        span = (drop.edges[-1].tick - drop.edges[0].tick) / drop.tick_hz
-        yield f"run {drop.run}: {len(drop.edges)} edges in {span:.4g} s; by channel {counts}"
 
 
 def _check_plan(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:

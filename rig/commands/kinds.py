@@ -63,13 +63,6 @@ def _place(names: str, text: str) -> Path:
     return place
 
 
-def _new_place(names: str, text: str) -> Path:
-    """Read a place as `_place` does where no file is yet: people wrote what it would replace."""
-    place = _place(names, text)
-    check_new(place)
-    return place
-
-
 def _quantity(text: str, dimension: str) -> float:
     """Read a quantity; units, with fractions and decimals, are loaded only for one."""
     units = import_module("rig.units")
@@ -119,7 +112,7 @@ KINDS: dict[str, dict[str, Any]] = {
     ),
     "trials": _accept("a whole number from 2", int, lambda trials: trials >= 2),
     "file": {"type": _place},
-    "new": {"type": _new_place},
+    "new": {"type": lambda names, text: check_new(_place(names, text))},
     "path": {"type": lambda text: Path(text) if text else None},
     "formats": {"action": _ListFormats, "nargs": 0},
 }

@@ -9,7 +9,6 @@ from typing import Any
 
 from rig.boards import BOARDS, GATES
 from rig.commands.output import Arguments, print_results
-from rig.errors import InputError
 from rig.files import check_new, write_atomic
 from rig.predictions import notes
 from rig.protocol import reader
@@ -17,6 +16,7 @@ from rig.protocol.describe import describe
 from rig.protocol.draft import SCENES, Draft, Scene, draft_text
 from rig.protocol.measurable import check_recordable
 from rig.ready import WIRED
+from rig.reasons import rig_error
 from rig.report.canvas import figure_file
 from rig.report.mounting import mounting_figure
 from rig.report.wiring import wiring_drawing
@@ -36,9 +36,8 @@ _CHOICE = Path(__file__).with_name("choose.txt").read_text("utf-8")
 def main(arguments: Arguments) -> int:
     """Write a protocol, draw and describe it, and try it in simulation."""
     path: Path = arguments.output
-    places = {word: path.with_name(f"{path.stem}-{word}.svg") for word in ("mounting", "wiring")}
-    for place in places.values():
-        check_new(place)
+    drawings = ("mounting", "wiring")
+    places = {word: check_new(path.with_name(f"{path.stem}-{word}.svg")) for word in drawings}
     board, draft = _read_answers(arguments, path)
     text = draft_text(draft)
     protocol = reader.parse(text, str(path))
@@ -70,7 +69,7 @@ def _read_answers(arguments: Arguments, path: Path) -> tuple[str, Draft]:
     fitting = [row for row in rows if not row[0] or scene in row[0].split()]
     for option in {row[1] for row in rows} - {row[1] for row in fitting}:
         if getattr(arguments, option) is not None:
-            raise InputError(f"--{option}: not in the scene {scene}", "leave it out")
+            raise rig_error("not_in_scene", option=option, name=scene)
     for _, option, question, usual in fitting:
         many = option == "incline" and answers.get("aim") == _COEFFICIENTS
         default = _MANY_INCLINES if many else usual
@@ -108,7 +107,7 @@ def _ask(arguments: Arguments, option: str, words: str, usual: str, accepted: Se
 
 def _count(name: str, text: str, limit: int) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= limit:
-        raise InputError(f"--{name}: found {text}; accepted: a whole number from 1 to {limit}")
+        raise rig_error("no_such_number", option=name, text=text, limit=limit)
     return int(text)
 
 

@@ -14,8 +14,7 @@ def main(arguments: Arguments) -> None:
         print("\n".join(text_table(rows, left={0, 1})))
         say("try one: rig run NAME --port sim:// --session my.session; copy one: rig ready NAME")
         return
-    copy = f"{arguments.name}.yaml"
     text = ready_protocol(arguments.name).read_text("utf-8")
-    check_new(copy)
+    copy = check_new(f"{arguments.name}.yaml")
     write_atomic(copy, text)
     say(f"protocol: {copy}")

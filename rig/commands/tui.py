@@ -46,20 +46,16 @@ async def _show(app: RigApp) -> None:
 
 
 def _options(arguments: Arguments) -> Options:
-    if arguments.protocol:
-        files: tuple[Path, ...] = (Path(arguments.protocol),)
-    else:
-        folders = (Path("protocols"), Path())
-        files = tuple(path for folder in folders for path in sorted(folder.glob("[!.]*.yaml")))
-    offline = bool(arguments.session) and not (
-        arguments.port or arguments.protocol or arguments.socket
-    )
+    folders = Path("protocols"), Path()
+    files = [path for folder in folders for path in sorted(folder.glob("[!.]*.yaml"))]
+    live = arguments.port or arguments.protocol or arguments.socket
+    offline = bool(arguments.session) and not live
     if not offline:
         require_sockets()
     check_name(arguments.port or "")  # before a daemon is started for it
     fresh = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}.session"
     return Options(
-        files=files,
+        files=(Path(arguments.protocol),) if arguments.protocol else tuple(files),
         port=arguments.port or "",
         session=Path(arguments.session or fresh),
         seed=arguments.seed,
