@@ -115,7 +115,7 @@ class Parser(argparse.ArgumentParser):
         self.exit(2)
 
 
-_MODULES = {"import": "import_edges"}
+_MODULES = {"import": "import_edges", "verify": "bundling"}
 """Modules of commands whose names are not theirs."""
 _WORDS: dict[str, dict[str, Any]] = {
     "flag": {"action": "store_true"},

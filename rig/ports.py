@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from urllib.parse import SplitResult, parse_qsl, urlencode, urlsplit
 
-from rig.errors import InputError
 from rig.reasons import rig_error
 
 SIMULATED = ("sim", "emu")
@@ -119,7 +118,7 @@ def _settings(url: str) -> dict[str, str]:
     parts, settings = _split(url), dict[str, str]()
     for name, text in parse_qsl(parts.query, keep_blank_values=True, errors=_BYTES):
         if name in settings:
-            raise InputError(f"{parts.scheme}://: {name} is given twice")
+            raise rig_error("setting_repeated", scheme=parts.scheme, name=name)
         settings[name] = text
     return settings
 
