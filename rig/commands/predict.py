@@ -3,9 +3,10 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
-from rig.analysis.result import Measured
+from rig.analysis.distributions import COVERAGE_95
 from rig.commands.output import Arguments, print_data, say
 from rig.files import write_atomic
 from rig.measurands import SEPARATION, SPEED, Measurand
@@ -47,10 +48,10 @@ def _write_table(protocol: Protocol, lines: list[PredictedIncline]) -> list[str]
     return [*part.table, *notes]
 
 
-def _value(line: PredictedIncline, row: Measurand) -> Measured | float | None:
+def _value(line: PredictedIncline, row: Measurand) -> SimpleNamespace:
     """Return a prediction with what its own numbers leave open."""
-    value, u = getattr(line, row.name), getattr(line, row.key("u"))
-    return Measured(value, u) if u else value
+    u = getattr(line, row.key("u"))
+    return SimpleNamespace(value=getattr(line, row.name), expanded=u and COVERAGE_95 * u)
 
 
 def _write_figure(number: int, path: Path) -> None:
