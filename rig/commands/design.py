@@ -98,8 +98,8 @@ def _forecast(protocol: Protocol, components: Components) -> dict[str, Any]:
 def design_lines(design: Mapping[str, Any]) -> list[str]:
     """Write layouts and their uncertainties, for a terminal."""
     layouts = {name: design[name] for name in ("current", "proposed") if name in design}
-    cells = {name: _uncertainties(layout) for name, layout in layouts.items()}
-    rows = [[name, *(column[name] for column in cells.values())] for name in cells["current"]]
+    cells = [_uncertainties(layout) for layout in layouts.values()]
+    rows = [[name, *(column[name] for column in cells)] for name in cells[0]]
     text = [
         f"expected standard uncertainties of {design['runs']} runs, with the {design['scatter']} "
         "scatter",

@@ -1,10 +1,8 @@
 """``rig predict``."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 from rig.analysis.distributions import COVERAGE_95
 from rig.commands.output import Arguments, print_data, say
@@ -15,7 +13,7 @@ from rig.predictions import group_notes, predictions
 from rig.protocol import reader
 from rig.protocol.protocol import Protocol
 from rig.report.columns import table_parts
-from rig.report.numbers import degrees, fixed
+from rig.report.numbers import fixed
 from rig.text_table import csv_text
 
 
@@ -34,12 +32,8 @@ def _write_table(protocol: Protocol, lines: list[PredictedIncline]) -> list[str]
     """Lay predictions out as text, notes below; without columns of what the scene does not have."""
     struck = protocol.surface is not None
     rows = (SEPARATION, SPEED) if protocol.two_chains else (SPEED,)
-    cells: dict[str, Callable[[PredictedIncline], Any]] = {
-        "incline": lambda line: degrees(line.incline_deg) if struck else "",
-        "values": lambda line: {row.name: _value(line, row) for row in rows if struck},
-        "speed": lambda line: None if struck else line.speed_m_s,
-    }
-    (part,) = table_parts("predictions", lines, derived=cells)
+    values = {"values": lambda line: {row.name: _value(line, row) for row in rows}}
+    (part,) = table_parts("predictions" if struck else "fall", lines, derived=values)
     part = replace(part, rows=[[cell or "–" for cell in row] for row in part.rows])
     notes = group_notes(lines)
     if struck:

@@ -60,9 +60,8 @@ def make_report(
     sections, estimated = Sections(), None
     if estimate:
         stage("estimating the impacts")
-        estimated = sections.make(
-            "The estimate of the impacts", lambda: _estimate(session, outcome, fresh=fresh)
-        )
+        with sections.alone("The estimate of the impacts"):
+            estimated = _estimate(session, outcome, fresh=fresh)
     stage("writing the page")
     html, figures = page_html(session_page(session, outcome, bars, estimated, sections))
     stage("")
