@@ -90,8 +90,8 @@ def describe_history(session: Reader, examined: ExaminedFile, analysis: Analysis
     return lines("history", session, first, changes, protocol.blind)
 
 
-def main(arguments: Arguments) -> int:
-    """Verify a bundle, the folder that it was unpacked into, or a session file."""
+def verify(arguments: Arguments) -> int:
+    """Check a bundle, the folder that it was unpacked into, or a session file."""
     check = _check_bundle if is_bundle(arguments.file) else _check_session
     findings = dict.fromkeys(check(arguments.file, arguments.key))
     faults = [line for line in findings if line.startswith((contents.WRONG, *FAULTS))]

@@ -31,6 +31,13 @@ def carry_out(
     return int(findings.failed)
 
 
+def measure_scenes(arguments: Namespace) -> int:
+    """Say what each scene loads, takes and evaluates, as ``rig bench scenes`` does."""
+    from rig.bench import scenes  # noqa: PLC0415 - no other study needs it
+
+    return carry_out("scenes", scenes.run, arguments)
+
+
 def _write(folder: Path, name: str, findings: Findings) -> None:
     """Write the table and pictures, and where there is a head also a page and all figures."""
     columns = dict.fromkeys(column for row in findings.rows for column in row)
