@@ -71,7 +71,7 @@ class Parser(argparse.ArgumentParser):
     def parse(self, args: Sequence[str]) -> argparse.Namespace:
         """Parse; what is left over or in wrong company is the mistake of the sub-command."""
         arguments, rest = self.parse_known_args(_join_pairs(args))
-        command = self.commands.get(vars(arguments).pop("command", ""), self)
+        command = self.commands.get(vars(arguments).get("command", ""), self)
         if rest:
             command.error(f"unknown arguments: {' '.join(rest)}")
         command._check_company(arguments)
