@@ -24,11 +24,8 @@ from rig.runner import Operator, run_protocol
 from rig.streams import ask, say
 from rig.text_rows import read_rows
 
-_COEFFICIENTS = "coefficients"
 _SIZES = ("gates", "rods", "length", "diameter", "drop", "repeats")
 """Answers that a draft takes as they are."""
-_MANY_INCLINES = "30 deg, 40 deg, 50 deg, 60 deg, 70 deg"
-"""Where the coefficients are to be measured, if no inclines are given."""
 _CHOICE = Path(__file__).with_name("choose.txt").read_text("utf-8")
 """What somebody has, the ready protocol for it, and the command; README begins with it too."""
 
@@ -64,17 +61,17 @@ def _read_answers(arguments: Arguments, path: Path) -> tuple[str, Draft]:
         say(f"What have you got?\n{_CHOICE.replace('`', '')}")
     word = _ask(arguments, "scene", "What do you drop?", "object", SCENES)
     scene: Scene = next(name for name in SCENES if name == word)
-    answers: dict[str, Any] = {"rods": "1", "length": "", "incline": ""}
+    answers: dict[str, Any] = {}
     rows = read_rows(__file__)
     fitting = [row for row in rows if not row[0] or scene in row[0].split()]
     for option in {row[1] for row in rows} - {row[1] for row in fitting}:
         if getattr(arguments, option) is not None:
             raise rig_error("not_in_scene", option=option, name=scene)
-    for _, option, question, usual in fitting:
-        many = option == "incline" and answers.get("aim") == _COEFFICIENTS
-        default = _MANY_INCLINES if many else usual
-        words = {"board": (*BOARDS, "other"), "aim": (usual, _COEFFICIENTS)}.get(option, ())
-        answers[option] = _ask(arguments, option, question, default, words)
+    for where, option, question, usual, *words in rows:
+        here = not where or {scene, answers.get("aim")} & {*where.split()}
+        if here and option not in answers:
+            answers[option] = _ask(arguments, option, question, usual, " ".join(words).split())
+    answers = {"rods": "1", "length": "", "incline": ""} | answers
     for option, limit in {"gates": GATES, "rods": 1000, "repeats": 1000}.items():
         answers[option] = _count(option, answers[option], limit)
     title = arguments.title or path.stem.replace("-", " ").replace("_", " ")
