@@ -81,11 +81,9 @@ def replay(session: Reader, progress: Progress | None = None) -> Outcome:
         stored = results(session, progress).records()
         once_more = again if again.chunks else session
         pairs["results"] = results(once_more, progress).records(), stored
-    ends = {
-        what: "identical" if pair[0] == pair[1] else "DIFFERENT" for what, pair in pairs.items()
-    }
-    differences = tuple(what for what, end in ends.items() if end == "DIFFERENT")
+    differences = tuple(what for what, (new, old) in pairs.items() if new != old)
     lines = [] if again.chunks else ["no bytes were recorded: the edges come from a file"]
-    lines += [f"{what}: {len(pairs[what][1])} {end}" for what, end in ends.items()]
+    for what, (_, old) in pairs.items():
+        lines.append(f"{what}: {len(old)} {'DIFFERENT' if what in differences else 'identical'}")
     lines.append(f"DIFFERENT: {', '.join(differences)}" if differences else "identical")
     return Outcome(tuple(lines), differences)
