@@ -63,6 +63,9 @@ def test_each_raised_code_is_in_the_table():
     missing = {(path.name, code) for path, code, _ in raised_codes() if code not in WORDINGS}
     assert not missing
     assert set(WORDINGS) >= REFUSED | DISARMED
+    for _, code, call in raised_codes():  # where a call names a class, it is the table's
+        classes = {"RigError", name_of(call.args[0])}
+        assert name_of(call.func) != "make_error" or WORDINGS[code].error.__name__ in classes
 
 
 def given(call, tree):
