@@ -22,8 +22,6 @@ from rig.report.numbers import decimals_for, fixed
 from rig.report.templates import lines
 from rig.text_table import text_table
 
-SPACING_M = 0.01
-
 
 def main(arguments: Arguments) -> None:
     """Predict the uncertainties of a layout, and search for a better layout."""
@@ -34,7 +32,7 @@ def main(arguments: Arguments) -> None:
         protocol = replace(protocol, plan=replace(protocol.plan, repeats=arguments.repeats))
     learned = arguments.learned
     components = _read_scatter(learned, protocol) if learned else priors(protocol)
-    limits = room(protocol, arguments.lowest, arguments.highest, arguments.spacing or SPACING_M)
+    limits = room(protocol, arguments.lowest, arguments.highest, arguments.spacing)
     if limits.lowest > limits.highest:
         raise rig_error("beams_reversed")
     layouts: dict[str, Any] = {
