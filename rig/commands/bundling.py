@@ -23,8 +23,6 @@ from rig.session.hashes import protocol_first
 from rig.session.reading import Reader
 from rig.session.store import Session
 
-_FIXED = {True: "yes", False: "no", None: "unknown"}
-
 
 class DerivedBundle(NamedTuple):
     """All files that follow from a session file, its analysis, and the state of the file."""
@@ -78,16 +76,12 @@ def derive_bundle(data: bytes) -> DerivedBundle:
 def describe_history(session: Reader, examined: ExaminedFile, analysis: Analysis) -> list[str]:
     """List what was fixed beforehand, deviations from the plan, unblinding and attached files."""
     protocol = protocol_of(session)
+    imported = next(session.byte_log(), None) is None
     links = examined.rows.in_order("hash")
-    if next(session.byte_log(), None) is None:
-        first = "unknown, the edges were imported"
-    elif not links:
-        first = "unknown, an older program recorded the session, without a chain of hashes"
-    else:
-        broken = any("table protocol" in line or "table hash" in line for line in examined.damage)
-        first = "no" if broken else _FIXED[protocol_first(links)]
+    broken = any("table protocol" in line or "table hash" in line for line in examined.damage)
+    first = False if broken else protocol_first(links)
     changes = deviations(protocol, analysis, session.states())
-    return lines("history", session, first, changes, protocol.blind)
+    return lines("history", session, imported, links, first, changes, protocol.blind)
 
 
 def verify(arguments: Arguments) -> int:
