@@ -114,16 +114,13 @@ def print_results(outcome: SessionResults, *, as_json: bool, **members: object) 
     if as_json:
         print_json(outcome.json() | members)
     else:
-        if outcome.simulated:
-            print("SIMULATED DATA")
-        if outcome.blind:
-            print("BLIND: results stay hidden until rig unblind SESSION")
         from rig.report.finding import remarks, void_lines  # noqa: PLC0415
         from rig.report.parts import summary_table  # noqa: PLC0415 - few commands print one
+        from rig.report.templates import lines  # noqa: PLC0415 - likewise
 
-        if not outcome.blind:
-            show(summary_table(outcome.analysis.summary).splitlines())
-        show([*void_lines(outcome.analysis), *outcome.analysis.damage, *remarks(outcome)])
+        means = [] if outcome.blind else summary_table(outcome.analysis.summary).splitlines()
+        show([*lines("stamp", outcome), *means, *void_lines(outcome.analysis)])
+        show([*outcome.analysis.damage, *remarks(outcome)])
     return exit_code(outcome.analysis)
 
 

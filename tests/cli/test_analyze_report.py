@@ -130,7 +130,7 @@ def test_a_budget_adds_up_and_agrees_with_its_trials(call, finished):
     [
         ((1, "--trials", "many"), "found 'many'; accepted: a whole number from 2"),
         ((1, "--trials", "1"), "found '1'; accepted: a whole number from 2"),
-        ((99,), "there are: runs 1–4"),
+        ((99,), "recorded: runs 1–4"),
     ],
 )
 def test_what_is_no_run_or_no_number_of_trials_is_bad_input(call, finished, words, said):
