@@ -19,7 +19,7 @@ from rig.protocol.protocol import Protocol
 from rig.reasons import rig_error
 from rig.report.estimate import symbol
 from rig.report.numbers import decimals_for, fixed
-from rig.report.templates import lines
+from rig.report.templates import sentence
 from rig.text_table import text_table
 
 
@@ -98,15 +98,8 @@ def design_lines(design: Mapping[str, Any]) -> list[str]:
     layouts = {name: design[name] for name in ("current", "proposed") if name in design}
     cells = [_uncertainties(layout) for layout in layouts.values()]
     rows = [[name, *(column[name] for column in cells)] for name in cells[0]]
-    text = [
-        f"expected standard uncertainties of {design['runs']} runs, with the {design['scatter']} "
-        "scatter",
-        "",
-        *text_table([["quantity", *layouts], *rows], left={0}, rule=True),
-    ]
-    for name, layout in layouts.items():
-        text += ["", *lines("layout", name, layout)]
-    return text
+    table = text_table([["quantity", *layouts], *rows], left={0}, rule=True)
+    return sentence("design", design, table).split("\n")
 
 
 def _uncertainties(layout: Mapping[str, Any]) -> dict[str, str]:
