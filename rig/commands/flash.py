@@ -4,6 +4,7 @@ from rig.commands.output import Arguments, goes_on, say
 from rig.flash.boards import DRIVE, TARGETS, UNSEEN
 from rig.flash.steps import flash
 from rig.reasons import rig_error
+from rig.report.templates import sentence
 
 
 @goes_on("the firmware may be incomplete; run the same command again")
@@ -15,8 +16,5 @@ def main(arguments: Arguments) -> None:
     if TARGETS[board] is not DRIVE and drive is not None:
         raise rig_error("drive_of_arduino", board=DRIVE.board.name)
     identity = flash(board, arguments.port, arguments.hex, avrdude or drive, say)
-    print(
-        f"{identity.board}, {identity.firmware}, {identity.gates} gates, "
-        f"id {identity.unique_id.hex()}: flashed and verified"
-    )
+    print(sentence("flashed", identity.json()))
     say(f"this firmware was {UNSEEN}")
