@@ -20,10 +20,10 @@ def main(arguments: Arguments) -> None:
     if arguments.board:
         check_recordable(protocol, BOARDS[arguments.board])
     if arguments.output:
-        from rig.report.canvas import write_figure  # noqa: PLC0415 - matplotlib, only here
-        from rig.report.mounting import mounting_figure  # noqa: PLC0415 - likewise
+        from rig.report import canvas, mounting  # noqa: PLC0415 - matplotlib, only here
 
-        write_figure(arguments.output, mounting_figure(protocol, check_gates(protocol)))
+        figure = mounting.mounting_figure(protocol, check_gates(protocol))
+        canvas.write_figure(arguments.output, figure)
     print(describe(protocol, [*notes(protocol), *_trials(protocol)]))
 
 

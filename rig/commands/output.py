@@ -114,13 +114,11 @@ def print_results(outcome: SessionResults, *, as_json: bool, **members: object) 
     if as_json:
         print_json(outcome.json() | members)
     else:
-        from rig.report.finding import remarks, void_lines  # noqa: PLC0415
-        from rig.report.parts import summary_table  # noqa: PLC0415 - few commands print one
-        from rig.report.templates import lines  # noqa: PLC0415 - likewise
+        from rig.report import finding, parts, templates  # noqa: PLC0415 - few commands print one
 
-        means = [] if outcome.blind else summary_table(outcome.analysis.summary).splitlines()
-        show([*lines("stamp", outcome), *means, *void_lines(outcome.analysis)])
-        show([*outcome.analysis.damage, *remarks(outcome)])
+        means = [] if outcome.blind else parts.summary_table(outcome.analysis.summary).splitlines()
+        show([*templates.lines("stamp", outcome), *means, *finding.void_lines(outcome.analysis)])
+        show([*outcome.analysis.damage, *finding.remarks(outcome)])
     return exit_code(outcome.analysis)
 
 

@@ -50,12 +50,11 @@ def _value(line: PredictedIncline, row: Measurand) -> SimpleNamespace:
 
 def _write_figure(number: int, path: Path) -> None:
     """Write a figure of the paper, and its numbers as CSV beside it."""
-    from rig.report.canvas import write_figure  # noqa: PLC0415 - it needs matplotlib
-    from rig.report.paper import paper_figure  # noqa: PLC0415 - likewise
+    from rig.report import canvas, paper  # noqa: PLC0415 - they need matplotlib
 
     picture = path.with_suffix(".svg") if path.suffix == ".csv" else path
-    drawing, columns = paper_figure(number)
+    drawing, columns = paper.paper_figure(number)
     rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
-    write_figure(picture, drawing)
+    canvas.write_figure(picture, drawing)
     write_atomic(path.with_suffix(".csv"), csv_text(columns, rows))
     say(f"{picture} and {path.with_suffix('.csv')}")
