@@ -81,7 +81,7 @@ def _carry_out(words: list[str], struck: list[object]) -> int:
         arguments = _parser(words).parse(words)
     finally:
         sys.stdout.flush()  # of --help, here, where a closed pipe is understood
-    if "module" not in arguments:
+    if "place" not in arguments:
         say(first_help(), end="")
         return BAD_INPUT
     from rig.ctrl_c import ctrl_c_goes_to  # noqa: PLC0415 - `rig --help` needs none of it
@@ -90,9 +90,10 @@ def _carry_out(words: list[str], struck: list[object]) -> int:
         struck.append(frame)
         signal.default_int_handler(number, frame)
 
-    command = import_module(f"rig.commands.{arguments.module}")
+    module, _, function = arguments.place.partition(".")
+    command = getattr(import_module(f"rig.commands.{module}"), function)
     with ctrl_c_goes_to(strike):
-        code: int = command.main(arguments) or 0
+        code: int = command(arguments) or 0
         sys.stdout.flush()
     return code
 

@@ -71,7 +71,7 @@ class Parser(argparse.ArgumentParser):
     def parse(self, args: Sequence[str]) -> argparse.Namespace:
         """Parse; what is left over or in wrong company is the mistake of the sub-command."""
         arguments, rest = self.parse_known_args(_join_pairs(args))
-        command = self.commands.get(vars(arguments).pop("command", ""), self)
+        command = self.commands.get(vars(arguments).get("command", ""), self)
         if rest:
             command.error(f"unknown arguments: {' '.join(rest)}")
         command._check_company(arguments)
@@ -115,8 +115,6 @@ class Parser(argparse.ArgumentParser):
         self.exit(2)
 
 
-_MODULES = {"import": "import_edges"}
-"""Modules of commands whose names are not theirs."""
 _WORDS: dict[str, dict[str, Any]] = {
     "flag": {"action": "store_true"},
     "yes-no": {"action": argparse.BooleanOptionalAction},
@@ -195,8 +193,7 @@ def build_parser(kinds: dict[str, dict[str, Any]], words: Sequence[str] = ()) ->
         parsers[name] = below[outer].add_parser(
             last, description=command.text, epilog=examples, **options
         )
-        module = _MODULES.get(name, name.replace(" ", "_"))
-        parsers[name].set_defaults(module=module, command=name)
+        parsers[name].set_defaults(place=command.place, command=name)
         for row in command.arguments:
             _add_argument(parsers[name], row, _WORDS | kinds)
     return parser

@@ -8,13 +8,13 @@ from rig import __version__
 
 
 # Of collections, for typing takes a third as long to load as Python.
-class Command(namedtuple("Command", "name text arguments examples")):
+class Command(namedtuple("Command", "name place text arguments examples")):
     """One command, or one of two words below another.
 
     Attributes
     ----------
-    name, text
-        Its words, and what it does.
+    name, place, text
+        Its words, the module and function of `rig.commands` that carry it out, and what it does.
     arguments
         Rows for `rig.command_help`.
     examples
@@ -22,6 +22,7 @@ class Command(namedtuple("Command", "name text arguments examples")):
     """
 
     name: str
+    place: str
     text: str
     arguments: list[str]
     examples: list[str]
@@ -46,9 +47,11 @@ def _read_page() -> dict[str, list[Command]]:
             groups[head.removeprefix("## ")] = commands = []
         elif not head.startswith("#"):
             examples = [line.strip(" $") for line in lines if line.startswith("  $ ")]
-            name, text = head.split(": ", 1)
+            heading, text = head.split(": ", 1)
+            name, _, place = heading.partition(" = ")
+            place = place or f"{name.replace(' ', '_')}.main"
             rows = [shared.get(line, line) for line in lines[: len(lines) - len(examples)]]
-            commands.append(Command(name, text, rows, examples))
+            commands.append(Command(name, place, text, rows, examples))
     return groups
 
 

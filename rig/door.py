@@ -11,34 +11,31 @@ Values are in SI units, angles in degrees. A session is opened for reading; noth
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rig.analysis.result import GOOD, DropResult, Measured, optional_package
+from rig.analysis.summary import Incline
 from rig.bundle.tables import column_unit, result_tables
-from rig.errors import InputError, SessionError
+from rig.errors import InputError
 from rig.measurands import MEASURANDS
 from rig.model.prediction import PredictedIncline
 from rig.predictions import predictions
 from rig.protocol import reader
+from rig.protocol.protocol import Protocol
 from rig.ready import find_protocol
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.report.numbers import ranges, with_unit
 from rig.report.parts import means_parts, summary_table
 from rig.report.templates import parts_html
 from rig.results import SessionResults, calibration, protocol_of, results
 from rig.results.together import MeanDifference, TogetherResults, results_together
 from rig.session.store import Session
-
-if TYPE_CHECKING:
-    import os
-    from collections.abc import Callable, Mapping
-
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from rig.analysis.summary import Incline
-    from rig.protocol.protocol import Protocol
 
 __all__ = [
     "Edges",
@@ -157,12 +154,10 @@ class RecordedSession:
         drops = [drop for drop in recorded if drop.run == run and attempt in {None, drop.attempt}]
         if not drops:
             runs = ranges("run", [drop.run for drop in recorded])
-            raise make_error(InputError, "run_unrecorded", path=self._file.path, run=run, runs=runs)
+            raise rig_error("run_unrecorded", path=self._file.path, run=run, runs=runs)
         drop = drops[-1]
         if drop.damage:
-            raise SessionError(
-                f"run {run}, attempt {drop.attempt}: {drop.damage}", "see rig recover SESSION"
-            )
+            raise rig_error("drop_damaged", drop=str(drop.job), text=drop.damage)
         ticks, channels, blocked = np.array(drop.edges, np.int64).reshape(-1, 3).T
         return Edges(ticks / calibration(self._file).scale(drop).hz, channels, blocked != 0)
 

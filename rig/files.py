@@ -100,8 +100,8 @@ def check_place(path: str | os.PathLike[str]) -> None:
             raise InputError(f"cannot write {path}: a session is there", "name another file")
 
 
-def check_new(path: str | os.PathLike[str]) -> None:
-    """See that nothing is at a place yet, for a file that people write on.
+def check_new(path: str | os.PathLike[str]) -> Path:
+    """Return a place at which nothing is yet, for a file that people write on.
 
     Raises
     ------
@@ -110,6 +110,7 @@ def check_new(path: str | os.PathLike[str]) -> None:
     """
     if os.path.lexists(path):
         raise InputError(f"{path} already exists", "name a new file, or move this file away")
+    return Path(path)
 
 
 @contextmanager

@@ -7,10 +7,11 @@ A new measurand is a row of ``measurands.txt`` and the function that computes it
 from __future__ import annotations
 
 import re
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
+
+from rig.text_rows import read_rows
 
 _UNIT = re.compile(r"(_(m|kg|s|A|K|mol|cd|rad|sr|Hz|N|Pa|J|W|C|V|F|Ohm|S|Wb|T|H|lm|lx)[1-9]?)+$")
 """The SI unit at a name's end: base units and those with names of their own (SI brochure, 2.3)."""
@@ -74,8 +75,8 @@ class Measurand:
         return f"{self.title} {self.symbol} ({self.unit})"
 
 
-def _read_row(row: str) -> Measurand:
-    name, symbol, label, title, usual, fine, flags, meaning = map(str.strip, row.split("|"))
+def _measurand(cells: Iterable[str]) -> Measurand:
+    name, symbol, label, title, usual, fine, flags, meaning = cells
     (unit, scale, decimals), (fine_unit, fine_scale, fine_decimals) = usual.split(), fine.split()
     options: dict[str, Any] = dict.fromkeys(flags.split(), True)
     return Measurand(
@@ -85,10 +86,7 @@ def _read_row(row: str) -> Measurand:
     )
 
 
-_LINES = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
-MEASURANDS = {
-    row.name: row for row in (_read_row(line) for line in _LINES if not line.startswith("#"))
-}
+MEASURANDS = {row.name: row for row in map(_measurand, read_rows(__file__))}
 
 SEPARATION = MEASURANDS["separation_m"]
 SPEED = MEASURANDS["speed_m_s"]

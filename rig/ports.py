@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from urllib.parse import SplitResult, parse_qsl, urlencode, urlsplit
 
-from rig.errors import InputError
+from rig.reasons import rig_error
 
 SIMULATED = ("sim", "emu")
 """URL schemes behind which no real chain falls."""
@@ -50,10 +50,7 @@ def fill_url(url: str, protocol: Path, session: Path, seed: int | None, before: 
         earlier = _settings(before)
         seed_before = earlier.get("seed", "0")
         if (new := settings.get("seed", seed_before)) != seed_before:
-            raise InputError(
-                f"{session} was simulated with seed {seed_before}: seed {new} means other chains",
-                "leave the seed out to continue it, or give a new session file",
-            )
+            raise rig_error("seed_differs", path=session, before=seed_before, seed=new)
         settings = earlier | settings
     places = {"protocol": str(protocol.resolve()), "truth": str(truth_file(session))}
     return _with_settings(url, settings, **places, seed="0")
@@ -77,11 +74,8 @@ def check_name(url: str) -> None:
     parts = _split(url)
     extra = parts.netloc + parts.path or (parts.fragment and f"#{parts.fragment}")
     if extra and parts.scheme in SIMULATED:
-        raise InputError(
-            f"{url}: unexpected {extra!r}",
-            f"leave it out; settings stand behind the ?, as in {parts.scheme}://?"
-            f"{_EXAMPLES[parts.scheme]}; a # in a setting is written %23",
-        )
+        example = f"{parts.scheme}://?{_EXAMPLES[parts.scheme]}"
+        raise rig_error("url_unexpected", url=url, extra=extra, example=example)
 
 
 def read_settings(url: str) -> dict[str, str]:
@@ -117,16 +111,14 @@ def _split(url: str) -> SplitResult:
     try:
         return urlsplit(url)
     except ValueError as error:
-        raise InputError(
-            f"{url} is no port: {error}", "a device path, or a URL such as sim://"
-        ) from None
+        raise rig_error("not_a_port", port=url, text=error) from None
 
 
 def _settings(url: str) -> dict[str, str]:
     parts, settings = _split(url), dict[str, str]()
     for name, text in parse_qsl(parts.query, keep_blank_values=True, errors=_BYTES):
         if name in settings:
-            raise InputError(f"{parts.scheme}://: {name} is given twice")
+            raise rig_error("setting_repeated", scheme=parts.scheme, name=name)
         settings[name] = text
     return settings
 

@@ -108,6 +108,17 @@ def make_error(kind: type[Failure], code: str, /, **values: Any) -> Failure:
     return error_of(kind, make_reason(code, **words))
 
 
+def rig_error(code: str, /, **values: Any) -> RigError:
+    """Make the error that refuses a request for a code, of the kind that the table says.
+
+    Parameters
+    ----------
+    code, **values
+        As for `make_error`.
+    """
+    return make_error(WORDINGS[code].error, code, **values)
+
+
 def _plain_value(value: object) -> object:
     if isinstance(value, OSError) and value.strerror:
         return value.strerror

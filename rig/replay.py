@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from rig.analysis.session import Progress
 from rig.records import ClockSample, Drop, Pulse
 from rig.results import results
 from rig.session.drop_check import ByteReplay, as_old_as
 from rig.session.reading import Reader
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from rig.analysis.session import Progress
-
 
 _JOB = attrgetter("job")
 
@@ -81,11 +77,9 @@ def replay(session: Reader, progress: Progress | None = None) -> Outcome:
         stored = results(session, progress).records()
         once_more = again if again.chunks else session
         pairs["results"] = results(once_more, progress).records(), stored
-    ends = {
-        what: "identical" if pair[0] == pair[1] else "DIFFERENT" for what, pair in pairs.items()
-    }
-    differences = tuple(what for what, end in ends.items() if end == "DIFFERENT")
+    differences = tuple(what for what, (new, old) in pairs.items() if new != old)
     lines = [] if again.chunks else ["no bytes were recorded: the edges come from a file"]
-    lines += [f"{what}: {len(pairs[what][1])} {end}" for what, end in ends.items()]
+    for what, (_, old) in pairs.items():
+        lines.append(f"{what}: {len(old)} {'DIFFERENT' if what in differences else 'identical'}")
     lines.append(f"DIFFERENT: {', '.join(differences)}" if differences else "identical")
     return Outcome(tuple(lines), differences)

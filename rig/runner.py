@@ -3,40 +3,33 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 from contextlib import closing, suppress
-from typing import TYPE_CHECKING, NamedTuple
+from pathlib import Path
+from typing import NamedTuple
 
+from rig.analysis.result import DropResult
 from rig.campaign import machine
 from rig.campaign.machine import Effect, Event, Flow, Stage, step
 from rig.campaign.plan import describe_setup, job_to_judge, next_job, plan_lines, rest_s
 from rig.campaign.voids import voids_of
+from rig.daemon.client import Client
 from rig.daemon.connecting import connect
 from rig.errors import DeviceError
 from rig.link.refusals import DeviceRefusedError
-from rig.measurands import told
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_recordable
 from rig.protocol.plan import runs
-from rig.reasons import sentences
+from rig.protocol.protocol import Protocol
 from rig.recorder.interrupts import Interrupts
-from rig.report.numbers import plus_minus, signed
+from rig.records import Drop, Job
+from rig.report.templates import sentence
 from rig.results import SessionResults, results
 from rig.results.live import LiveAnalysis
 from rig.session.schema import RunState
 from rig.session.store import Session
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from rig.analysis.result import DropResult
-    from rig.daemon.client import Client
-    from rig.protocol.protocol import Protocol
-    from rig.records import Drop, Job
-
-
 _FALL = (machine.FireRelease, machine.Collect, machine.Stop)
-_VALUE = 17  # characters, as of −3.2076 ± 0.0017
 
 
 class Operator(NamedTuple):
@@ -226,7 +219,7 @@ class Campaign:
                 case machine.Log(job, state, reasons):
                     self.rig.log_state(*job, RunState(state), reasons)
                     assert self._result is not None
-                    self.operator.say(narration(self._result, len(self.plan)))
+                    self.operator.say(sentence("drop", self._result, len(self.plan)))
         except DeviceRefusedError as refusal:
             if refusal is self._failed:
                 raise
@@ -248,18 +241,3 @@ class Campaign:
     def _stop(self, why: str) -> None:
         with suppress(DeviceError):
             self.rig.stop(why)
-
-
-def narration(result: DropResult, planned: int) -> str:
-    """One line about a drop, its columns where those of other drops are."""
-    run, found = result.run, result.quantities
-    parts = [f"run {run.number:>{len(str(planned))}}/{planned}"]
-    if run.impact is not None:
-        parts.append(f"{run.incline_deg:>4g}° impact {run.impact}")
-    parts += [
-        f"{row.symbol} {plus_minus(found[row.name], row.scale):>{_VALUE}} {row.unit}"
-        for row in told()
-        if row.name in found
-    ]
-    parts.append(": ".join(filter(None, [result.verdict, signed(sentences(result.reasons))])))
-    return "  ".join(parts)

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from decimal import Decimal
-from enum import Enum, auto
 from fractions import Fraction
-from pathlib import Path
+
+from rig.text_rows import read_rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,11 +38,8 @@ class UnitError(ValueError):
     """A text is not the quantity that was asked for; says what was found and what is accepted."""
 
 
-_LINES = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
-_ROWS = dict(line.split(" | ", 1) for line in _LINES if not line.startswith("#"))
-
-
-class Dimension(Enum):
+@dataclass(frozen=True, slots=True)
+class Dimension:
     """What a quantity measures, as its row of ``units.txt`` has it.
 
     Attributes
@@ -52,26 +50,20 @@ class Dimension(Enum):
         What each accepted unit is in base units.
     """
 
-    LENGTH = auto()
-    TIME = auto()
-    ANGLE = auto()
-    ACCELERATION = auto()
-    SPEED = auto()
-    MASS = auto()
-    DENSITY = auto()
-    FREQUENCY = auto()
-    TURNING = auto()
-    NUMBER = auto()
-
-    def __init__(self, _: int) -> None:
-        self.noun, self.example, units = _ROWS[self.name].split(" | ")
-        pairs = map(str.split, units.split(", "))
-        self.factors = {unit: Fraction(factor) for unit, factor in pairs}
+    noun: str
+    example: str
+    factors: Mapping[str, Fraction] = field(hash=False)
 
 
+def _dimension(noun: str, example: str, units: str) -> Dimension:
+    pairs = map(str.split, units.split(", "))
+    return Dimension(noun, example, {unit: Fraction(factor) for unit, factor in pairs})
+
+
+DIMENSIONS = {name: _dimension(*cells) for name, *cells in read_rows(__file__)}
 UNITS: dict[str, tuple[Dimension, Fraction]] = {
     unit: (dimension, factor)
-    for dimension in Dimension
+    for dimension in DIMENSIONS.values()
     for unit, factor in dimension.factors.items()
 }
 """What each unit measures, and what it is in base units."""

@@ -5,8 +5,10 @@ Every sentence that names what falls takes its words from here.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
+
+from rig.text_rows import read_rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,14 +42,13 @@ class Vocabulary:
     two_sides: bool = False
 
 
-def _read_row(row: str) -> Vocabulary:
-    scene, body, start, part, setup, handling = row.split(" | ")
+def _vocabulary(cells: Iterable[str]) -> Vocabulary:
+    scene, body, start, part, setup, handling = cells
     two_sides = scene == "two-chains"
     return Vocabulary(scene, body, start, part, setup, f"{handling} {body}", two_sides)
 
 
-_ROWS = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
-_SCENES = [_read_row(row) for row in _ROWS if not row.startswith("#")]
+_SCENES = [*map(_vocabulary, read_rows(__file__))]
 OBJECT, TRACK, FENCE, FREE_CHAIN, ONE_CHAIN, TWO_CHAINS = _SCENES
 ANY_SCENE = Vocabulary(
     "", "what falls", "it starts", "part", "your set-up", "preparing it", two_sides=True

@@ -1,4 +1,4 @@
-"""The one table of what the program says of each code: how bad it is, its label, sentence, remedy.
+"""The one table of what the program says of each code: its kind, label, sentence and remedy.
 
 The rows are in ``wordings.txt``. `rig.reasons` fills in values and the words of a scene; sentences
 are written there, never read back.
@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
 from string import Template
+
+from rig import errors
+from rig.errors import RigError
 
 OPERATOR, NOTE, SENTENCE = "operator", "note", "sentence"
 """Codes of what is only text: a cause to reject a drop, a note to it, a sentence of an old file."""
@@ -37,12 +40,15 @@ class Wording:
         What to do about it; empty where nothing is to be done.
     label
         In a few words, where several drops have it; empty where the code says it.
+    error
+        What a request ends with that is refused for it.
     """
 
     severity: Severity
     sentence: str
     remedy: str = ""
     label: str = ""
+    error: type[RigError] = RigError
 
 
 def _read_rows(text: str) -> tuple[dict[str, Wording], dict[str, str]]:
@@ -57,9 +63,11 @@ def _read_rows(text: str) -> tuple[dict[str, Wording], dict[str, str]]:
             shared = dict(line.strip().split(": ", 1) for line in lines)
             continue
         name, _, label = head.partition(": ")
-        severity, code = name.split()
+        kind, code = name.split()
+        error = vars(errors).get(kind)
+        severity = Severity[kind.upper()] if error is None else Severity.VOID
         sentence, *remedy = (Template(line.strip()).safe_substitute(shared) for line in lines)
-        rows[code] = Wording(Severity[severity.upper()], sentence, "".join(remedy), label)
+        rows[code] = Wording(severity, sentence, "".join(remedy), label, error or RigError)
     return rows, shared
 
 

@@ -7,12 +7,12 @@ from dataclasses import Field, field
 from typing import Any
 
 from rig.errors import InputError
-from rig.units import Dimension, UnitError, parse
+from rig.units import DIMENSIONS, Dimension, UnitError, parse
 
 
 def dial(
     default: float,
-    dimension: Dimension = Dimension.NUMBER,
+    dimension: Dimension = DIMENSIONS["NUMBER"],
     low: float = 0.0,
     high: float = math.inf,
     **traits: bool | str,
@@ -53,6 +53,6 @@ def read_value(spec: Field[Any], text: str, where: str) -> float:
         raise InputError(f"{where}: {text} is neither 0 nor 1")
     if not low <= value <= high:
         accepted = f"{low:g} to {high:g}" if high < math.inf else f"{low:g} or more"
-        unit = "" if dimension is Dimension.NUMBER else f" {next(iter(dimension.factors))}"
+        unit = "" if dimension is DIMENSIONS["NUMBER"] else f" {next(iter(dimension.factors))}"
         raise InputError(f"{where}: {text} is outside of what is accepted", accepted + unit)
     return value

@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 from rig.errors import InputError
-from rig.units import Dimension
+from rig.units import DIMENSIONS
 
 from .dial import dial, read_value
 from .resolved.contact_law import DEADEST
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     from rig.protocol.protocol import Protocol
 
-_TIME, _LENGTH = Dimension.TIME, Dimension.LENGTH
+_TIME, _LENGTH = DIMENSIONS["TIME"], DIMENSIONS["LENGTH"]
 _OF_THE_URL = ("dynamics", "pace", "seed", "series", "truth")  # no disturbances
 _SWITCH = dial(0.0, switch=True)
 _SLOWEST = -0.5  # of a clock, relative; a real one is off by less than 0.5 %
@@ -204,14 +204,14 @@ class ResolvedDials(Dials):
     rod_restitution: float = dial(0.5, low=DEADEST, high=1.0, kept=True)
     rod_friction: float = dial(0.3, high=10.0, kept=True)
     rods_touch: float = dial(1.0, kept=True, switch=True)
-    density: float = dial(450.0, Dimension.DENSITY, 1.0, 25e3, kept=True)
+    density: float = dial(450.0, DIMENSIONS["DENSITY"], 1.0, 25e3, kept=True)
     roll: float = dial(1.0, kept=True, switch=True)
-    tilt_sd: float = dial(1.0, Dimension.ANGLE, high=45.0)
-    yaw_sd: float = dial(2.0, Dimension.ANGLE, high=45.0)
+    tilt_sd: float = dial(1.0, DIMENSIONS["ANGLE"], high=45.0)
+    yaw_sd: float = dial(2.0, DIMENSIONS["ANGLE"], high=45.0)
     aside_sd: float = dial(0.5e-3, _LENGTH, high=0.1)
     off_centre_sd: float = dial(1e-3, _LENGTH, high=1.0)
-    swing_sd: float = dial(10e-3, Dimension.SPEED, high=10.0)
-    spin_sd: float = dial(0.0, Dimension.TURNING, high=100.0)
+    swing_sd: float = dial(10e-3, DIMENSIONS["SPEED"], high=10.0)
+    spin_sd: float = dial(0.0, DIMENSIONS["TURNING"], high=100.0)
 
 
 def or_stated(dial: float, stated: float) -> float:

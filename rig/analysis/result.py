@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.plain_data import attributes, plain
 from rig.errors import InputError
-from rig.protocol.protocol import Run
 from rig.reasons import Reason, make_error, reasons_json
 
 if TYPE_CHECKING:  # results are shown, and predictions made, where no drop is analysed
@@ -20,6 +19,7 @@ if TYPE_CHECKING:  # results are shown, and predictions made, where no drop is a
 
     from rig.analysis.edge_classes import UnmatchedEdge
     from rig.analysis.gate_passages import GatePassage
+    from rig.protocol.protocol import Run
 
 Verdict = Literal["accepted", "marginal", "void", "rejected"]
 GOOD: tuple[Verdict, ...] = ("accepted", "marginal")

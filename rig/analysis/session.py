@@ -206,10 +206,7 @@ def planned_run(planned: Mapping[int, Run], drop: Drop) -> Run:
     if drop.run not in planned:
         if drop.damage:  # the damage may be in its number
             raise make_error(InputError, "record_damaged", text=f"run {drop.run}: {drop.damage}")
-        raise InputError(
-            f"run {drop.run} is not in the plan, which has {len(planned)} runs",
-            "is it the right protocol? rig check PROTOCOL shows the plan",
-        )
+        raise make_error(InputError, "run_not_planned", run=drop.run, planned=len(planned))
     return planned[drop.run]
 
 

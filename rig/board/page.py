@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import base64
+from collections.abc import Mapping
 from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.analysis.result import GOOD
 from rig.board.picture import moving_picture
@@ -15,18 +16,12 @@ from rig.errors import RigError
 from rig.files import file_stamp
 from rig.records import Job
 from rig.report import looks
-from rig.report.figure import COLUMN_PT
+from rig.report.figure import COLUMN_PT, Chart
 from rig.report.figures import result_figure
 from rig.report.templates import render
-from rig.results.live import LiveAnalysis
+from rig.results.live import LiveAnalysis, SessionView
 from rig.tui.drop_words import LOOKS, headline, past_runs, sentence
 from rig.tui.motion import motions
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from rig.report.figure import Chart
-    from rig.results.live import SessionView
 
 _NOW = {"armed": " · is armed", "fired": " · falls"}
 _HERE = Path(__file__).parent

@@ -14,13 +14,10 @@ import socket
 import subprocess
 import sys
 from contextlib import suppress
-from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 
 from rig.errors import InputError
-
-if TYPE_CHECKING:
-    from rig.recorder.published import PublishedState
+from rig.recorder.published import PublishedState
 
 log = logging.getLogger(__name__)
 _TELL_S = 0.25

@@ -11,18 +11,15 @@ import hashlib
 import io
 import json
 import mimetypes
+import os
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig import __version__
-from rig.errors import InputError
+from rig.errors import RigError
 from rig.files import read_input
-from rig.reasons import make_error
-
-if TYPE_CHECKING:
-    import os
-    from collections.abc import Mapping
+from rig.reasons import rig_error
 
 ROOT = "record/"
 """The one folder of the archive."""
@@ -178,11 +175,11 @@ def _read(path: Path) -> bytes:
     try:
         data = read_input(path, _LARGEST + 1)
     except OSError as error:
-        raise make_error(InputError, "bundle_unreadable", path=path, text=error) from error
+        raise rig_error("bundle_unreadable", path=path, text=error) from error
     if len(data) > _LARGEST:
         raise _foreign(path, f"it has more than {_LARGEST} bytes")
     return data
 
 
-def _foreign(path: Path, text: str) -> InputError:
-    return make_error(InputError, "bundle_foreign", path=path, text=text)
+def _foreign(path: Path, text: str) -> RigError:
+    return rig_error("bundle_foreign", path=path, text=text)

@@ -10,9 +10,10 @@ import math
 import platform
 import re
 import sqlite3
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig import __version__
 from rig.bundle.archive import CRATE, SUMS, seal, to_json
@@ -20,11 +21,7 @@ from rig.bundle.means import mean_tables
 from rig.bundle.tables import csv_files, data_package
 from rig.results import SessionResults, protocol_of
 from rig.session.faults import translate_errors
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from rig.session.reading import Reader
+from rig.session.reading import Reader
 
 SESSION, RESULTS, ENVIRONMENT = "record.session", "results.json", "environment.json"
 HISTORY = "deviations.txt"

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import math
 from itertools import combinations
-from typing import TYPE_CHECKING
 
+from rig.analysis.session import Analysis
+from rig.protocol.protocol import Protocol
 from rig.text_table import csv_text
-
-if TYPE_CHECKING:
-    from rig.analysis.session import Analysis
-    from rig.protocol.protocol import Protocol
 
 
 def mean_tables(protocol: Protocol, analysis: Analysis) -> dict[str, str]:

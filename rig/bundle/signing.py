@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import sys
+from collections.abc import Callable, Mapping
 from getpass import getpass
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from minisign import Error, PublicKey, SecretKey, Signature
 
 from rig.bundle.archive import PUBLIC_KEY, SIGNATURE, SUMS, list_hashes
 from rig.bundle.contents import WRONG
-from rig.errors import InputError
 from rig.files import read_input
-from rig.reasons import make_error
-
-if TYPE_CHECKING:
-    import os
-    from collections.abc import Callable, Mapping
+from rig.reasons import rig_error
 
 Key = TypeVar("Key")
 _COMMENT = "rig export --bundle"
@@ -37,7 +34,7 @@ def read_secret(key: str | os.PathLike[str]) -> SecretKey:
         secret = SecretKey.from_bytes(content)
         if secret.is_encrypted():
             if not sys.stdin.isatty():
-                raise make_error(InputError, "key_locked", path=key)
+                raise rig_error("key_locked", path=key)
             secret.decrypt(getpass(f"password of {key}: "))
         return secret
 
@@ -83,7 +80,7 @@ def _read_key(path: str | os.PathLike[str], read: Callable[[bytes], Key]) -> Key
     try:
         return read(read_input(path, _LONGEST))
     except (OSError, Error) as error:
-        raise make_error(InputError, "key_unusable", path=path, text=error) from error
+        raise rig_error("key_unusable", path=path, text=error) from error
 
 
 def _text(part: object) -> bytes:

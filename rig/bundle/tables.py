@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Container, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rig.bundle.archive import sha256
+from rig.clock.calibration import Calibration
 from rig.measurands import MEASURANDS
 from rig.reasons import sentences
+from rig.session.reading import Reader
 from rig.session.schema import TABLES
+from rig.text_rows import read_rows
 from rig.text_table import csv_text
 from rig.timers.edge_rows import HEADER, edges_text
-
-if TYPE_CHECKING:
-    from collections.abc import Container, Iterable, Mapping, Sequence
-
-    from rig.clock.calibration import Calibration
-    from rig.session.reading import Reader
 
 _LISTS = ("budget", "causes", "gates")  # of objects, for which a cell has no room
 _EDGES = "edges.csv"
@@ -25,8 +23,7 @@ _ROWS_OF = {"states.csv: ": "run_state", "pings.csv: ": "ping", "edges.csv: ": "
 """Whose raw records a file has, for the meaning of its columns."""
 
 
-_LINES = Path(__file__).with_name("columns.txt").read_text("utf-8").splitlines()
-_ROWS = dict(line.split(" | ") for line in _LINES if not line.startswith("#"))
+_ROWS = dict(read_rows(__file__, "columns.txt"))
 """The unit by the end of a column's name, which begins with ``_``, and what columns mean."""
 
 

@@ -1,12 +1,11 @@
 """``rig analyze``."""
 
-from argparse import Namespace
 from typing import Any
 
 from rig.analysis.result import Measured
 from rig.analysis.video import video_fall
 from rig.cache.entry import recall
-from rig.commands.output import print_results, progress, show, tell_damage
+from rig.commands.output import Arguments, print_results, progress, show, tell_damage
 from rig.measurands import acceleration_in
 from rig.report.parts import scatter_parts, tables
 from rig.report.templates import lines
@@ -15,7 +14,7 @@ from rig.session.store import Session
 from rig.timers.video import read_video
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Arguments) -> int:
     """Compute the results of a session, or of several together."""
     if arguments.further:
         from rig.commands.compare import analyze_together  # noqa: PLC0415 - only for several

@@ -2,7 +2,6 @@
 
 from argparse import Namespace
 from collections.abc import Iterator, Sequence
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,7 +11,6 @@ from rig.bench.problems import problems
 from rig.bench.references import own_error
 from rig.bench.work import TARGETS, Point, WorkProblem, cheapest, measure
 from rig.commands.output import say
-from rig.commands.study import carry_out
 from rig.text_table import text_table
 
 _HEAD = Path(__file__).with_suffix(".md").read_text("utf-8") + "\n"
@@ -84,9 +82,6 @@ class Study:
         routes = dict.fromkeys(one.route for one in self.problems)
         yield f"references, known to {max(1e-50, known):.0e}: {'; '.join(routes)}"
         yield from (f"left out: {setting}" for setting in self.left_out)
-
-
-main = partial(carry_out, "precision", run)
 
 
 def _words(point: Point | None) -> str:

@@ -3,7 +3,6 @@
 import math
 from argparse import Namespace
 from collections.abc import Iterable, Iterator
-from functools import partial
 from itertools import groupby
 from pathlib import Path
 
@@ -12,7 +11,6 @@ from rig.bench.figures import conditioning_figure
 from rig.bench.findings import Findings
 from rig.bench.stability import VERDICTS, StabilityRow, stability
 from rig.bench.work import EPSILON
-from rig.commands.study import carry_out
 from rig.text_table import text_table
 
 _HEAD = Path(__file__).with_suffix(".md").read_text("utf-8").rstrip()
@@ -32,9 +30,6 @@ def run(arguments: Namespace) -> Iterator[Findings]:
         {"rows": records, "counts": counts}, lines, _HEAD, records, conditioning_figure(rows),
         failed=counts["FAILED"] > 0,
     )  # fmt: skip
-
-
-main = partial(carry_out, "stability", run)
 
 
 def _lost(error: float | None) -> float:

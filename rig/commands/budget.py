@@ -1,6 +1,5 @@
 """``rig analyze --budget``: what the uncertainties of a run are made of."""
 
-from argparse import Namespace
 from functools import partial
 from typing import Any
 
@@ -10,27 +9,23 @@ from rig.analysis.drop import DropCase
 from rig.analysis.result import Measured
 from rig.analysis.session import planned_run
 from rig.cache.entry import recall
-from rig.commands.output import print_data
-from rig.errors import InputError
-from rig.measurands import Measurand
+from rig.commands.output import Arguments, print_data
 from rig.protocol.plan import runs
-from rig.reasons import sentences
-from rig.report.numbers import decimals_for, fixed, ranges
+from rig.reasons import rig_error, sentences
+from rig.report.numbers import ranges
 from rig.report.templates import sentence
 from rig.results import SessionResults, calibration, check_open, protocol_of
 from rig.session.reading import Reader
 
 SEED = 1
-_LEAST = 0.001  # in the finer unit: less is none
 
 
-def print_budget(session: Reader, outcome: SessionResults, arguments: Namespace) -> None:
+def print_budget(session: Reader, outcome: SessionResults, arguments: Arguments) -> None:
     """Print a run's budget in the session's light, and by itself."""
     asked = arguments.budget, arguments.trials, SEED
     make = partial(budget, session, outcome, *asked)
     account = recall(dict, make, "budget", outcome.digest, asked, fresh=arguments.fresh)
-    words = sentence("budget", account, _in_fine).split("\n")
-    print_data(account, words, as_json=arguments.json)
+    print_data(account, sentence("budget", account).split("\n"), as_json=arguments.json)
 
 
 def budget(
@@ -55,13 +50,13 @@ def budget(
     drop = next(iter(session.latest_drops(number)), None)
     if drop is None:
         recorded = ranges("run", (result.run.number for result in outcome.analysis.runs))
-        raise InputError(f"run {number} has no drop in this session", f"there are: {recorded}")
+        raise rig_error("run_unrecorded", path=session.path, run=number, runs=recorded)
     protocol = protocol_of(session)
     check_open(session, protocol)
     planned = planned_run({run.number: run for run in runs(protocol)}, drop)
     single, fit = DropCase(protocol, planned, drop, calibration(session).scale(drop)).read()
     if fit is None:
-        raise InputError(f"run {number} is void: {sentences(single.reasons)}")
+        raise rig_error("run_void", run=number, text=sentences(single.reasons))
     result = next(result for result in outcome.analysis.runs if result.run.number == number)
     account = {
         "simulated": outcome.simulated,
@@ -89,9 +84,3 @@ def _lines(measured: Measured) -> dict[str, Any]:
         "k": coverage_factor(degrees),
         "lines": [{"name": name, "u": u, "share": (u / measured.u) ** 2} for name, u in sources],
     }
-
-
-def _in_fine(row: Measurand, u: float) -> str:
-    """Write a standard uncertainty in a quantity's finer unit."""
-    fine = row.fine_scale * u
-    return f"{fixed(fine, decimals_for(fine)) if fine >= _LEAST else f'< {_LEAST:g}'} {row.fine}"

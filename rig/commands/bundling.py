@@ -1,17 +1,20 @@
-"""Making the files of a bundle from its session file, for ``rig export`` and ``rig verify``."""
+"""Bundles: ``rig export --bundle`` makes one, ``rig verify`` makes its files again and compares."""
 
-from argparse import Namespace
+import json
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from rig.analysis.session import Analysis
-from rig.bundle.archive import pack
-from rig.bundle.contents import SESSION, bundle_files, copy_session
-from rig.commands.output import progress, say, tell_damage
+from rig.bundle import contents
+from rig.bundle.archive import PUBLIC_KEY, SIGNATURE, is_bundle, pack, read_bundle
+from rig.commands.output import VOID, Arguments, progress, say, show, tell_damage
 from rig.commands.report import make_report
+from rig.errors import SessionError
 from rig.files import write_atomic
-from rig.recover.examine import ExaminedFile, examine
+from rig.reasons import rig_error
+from rig.recover.examine import FAULTS, ExaminedFile, describe, examine
 from rig.report.canvas import figure_file
 from rig.report.finding import deviations
 from rig.report.templates import lines
@@ -19,8 +22,6 @@ from rig.results import protocol_of, results
 from rig.session.hashes import protocol_first
 from rig.session.reading import Reader
 from rig.session.store import Session
-
-_FIXED = {True: "yes", False: "no", None: "unknown"}
 
 
 class DerivedBundle(NamedTuple):
@@ -31,7 +32,7 @@ class DerivedBundle(NamedTuple):
     examined: ExaminedFile
 
 
-def write_bundle(arguments: Namespace) -> int:
+def write_bundle(arguments: Arguments) -> int:
     """Write a session as a bundle; the same session gives the same bytes."""
     secret = None
     if arguments.sign is not None:
@@ -39,7 +40,7 @@ def write_bundle(arguments: Namespace) -> int:
 
         secret = signing.read_secret(arguments.sign)
     with Session.open(arguments.session, readonly=True) as session:
-        data = copy_session(session)
+        data = contents.copy_session(session)
     derived = derive_bundle(data)
     files = signing.sign(derived.files, secret) if secret else derived.files
     write_atomic(arguments.bundle, pack(files))
@@ -56,7 +57,7 @@ def derive_bundle(data: bytes) -> DerivedBundle:
         It cannot be read.
     """
     with TemporaryDirectory(prefix="rig-bundle-") as folder:
-        copy = Path(folder) / SESSION
+        copy = Path(folder) / contents.SESSION
         copy.write_bytes(data)
         examined = examine(copy)
         with Session.open(copy, readonly=True) as session:
@@ -68,20 +69,68 @@ def derive_bundle(data: bytes) -> DerivedBundle:
                 for number, figure in enumerate(report.figures, 1)
             }
             history = describe_history(session, examined, outcome.analysis)
-            files = bundle_files(session, data, outcome, drawn, history)
+            files = contents.bundle_files(session, data, outcome, drawn, history)
     return DerivedBundle(files, outcome.analysis, examined)
 
 
 def describe_history(session: Reader, examined: ExaminedFile, analysis: Analysis) -> list[str]:
     """List what was fixed beforehand, deviations from the plan, unblinding and attached files."""
     protocol = protocol_of(session)
+    imported = next(session.byte_log(), None) is None
     links = examined.rows.in_order("hash")
-    if next(session.byte_log(), None) is None:
-        first = "unknown, the edges were imported"
-    elif not links:
-        first = "unknown, an older program recorded the session, without a chain of hashes"
-    else:
-        broken = any("table protocol" in line or "table hash" in line for line in examined.damage)
-        first = "no" if broken else _FIXED[protocol_first(links)]
+    broken = any("table protocol" in line or "table hash" in line for line in examined.damage)
+    first = False if broken else protocol_first(links)
     changes = deviations(protocol, analysis, session.states())
-    return lines("history", session, first, changes, protocol.blind)
+    return lines("history", session, imported, links, first, changes, protocol.blind)
+
+
+def verify(arguments: Arguments) -> int:
+    """Check a bundle, the folder that it was unpacked into, or a session file."""
+    check = _check_bundle if is_bundle(arguments.file) else _check_session
+    findings = dict.fromkeys(check(arguments.file, arguments.key))
+    faults = [line for line in findings if line.startswith((contents.WRONG, *FAULTS))]
+    verdict = "not as recorded" if faults else "as recorded"
+    show([*(line for line in findings if line not in faults), *faults, f"verdict: {verdict}"])
+    return VOID if faults else 0
+
+
+def _check_session(path: str, key: str | None) -> Iterator[str]:
+    if key is not None:
+        raise rig_error("key_without_bundle", path=path)
+    examined = examine(path)
+    yield from describe(examined)
+    with Session.open(path, readonly=True) as session:
+        analysis = results(session, progress, fresh=True).analysis
+        yield from describe_history(session, examined, analysis)
+
+
+def _check_bundle(path: str, key: str | None) -> Iterator[str]:
+    stored, altered = read_bundle(path)
+    yield f"files: {len(stored)}, {'not all' if altered else 'all'} hashes agree"
+    yield from (contents.WRONG + text for text in altered)
+    if key is None and not {SIGNATURE, PUBLIC_KEY} & stored.keys():
+        yield "signature: none"
+    else:
+        from rig.bundle.signing import check_signature  # noqa: PLC0415 - an extra that few need
+
+        yield check_signature(stored, key)
+    if contents.SESSION not in stored:
+        return
+    try:
+        derived = derive_bundle(stored[contents.SESSION])
+    except SessionError as error:
+        yield contents.WRONG + error.message
+        return
+    yield from describe(derived.examined)[1:]
+    yield from contents.compare(stored, derived.files)
+    for words, files in (("made", stored), ("verified", derived.files)):
+        yield f"{words} with: {_versions(files)}"
+    yield from derived.files[contents.HISTORY].decode().splitlines()
+
+
+def _versions(files: Mapping[str, bytes]) -> str:
+    try:
+        versions = json.loads(files.get(contents.ENVIRONMENT, b""))
+        return ", ".join(f"{name} {number}" for name, number in versions.items())
+    except (ValueError, AttributeError):
+        return "unknown"

@@ -1,9 +1,7 @@
 """``rig check``."""
 
-from argparse import Namespace
-
 from rig.boards import BOARDS
-from rig.commands.output import print_data
+from rig.commands.output import Arguments, print_data
 from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
@@ -11,7 +9,7 @@ from rig.protocol.measurable import check_gates, check_recordable, unmeasurable
 from rig.protocol.protocol import Protocol
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Describe a protocol, or what any protocol may say."""
     if arguments.protocol is None:
         from rig.protocol.reference import page, schema  # noqa: PLC0415 - of no use to a protocol
@@ -22,10 +20,10 @@ def main(arguments: Namespace) -> None:
     if arguments.board:
         check_recordable(protocol, BOARDS[arguments.board])
     if arguments.output:
-        from rig.report.canvas import write_figure  # noqa: PLC0415 - matplotlib, only here
-        from rig.report.mounting import mounting_figure  # noqa: PLC0415 - likewise
+        from rig.report import canvas, mounting  # noqa: PLC0415 - matplotlib, only here
 
-        write_figure(arguments.output, mounting_figure(protocol, check_gates(protocol)))
+        figure = mounting.mounting_figure(protocol, check_gates(protocol))
+        canvas.write_figure(arguments.output, figure)
     print(describe(protocol, [*notes(protocol), *_trials(protocol)]))
 
 

@@ -1,42 +1,36 @@
 """``rig compare``."""
 
-from argparse import Namespace
 from contextlib import ExitStack
 
-from rig.commands.output import VOID, print_data, progress, say
+from rig.commands.output import VOID, Arguments, print_data, progress, say
 from rig.files import write_atomic
+from rig.report import comparison
 from rig.report.canvas import write_figure
-from rig.report.comparison import (
-    comparison_page,
-    difference_lines,
-    draw_comparison,
-    pooled_lines,
-)
 from rig.results.together import TogetherResults, results_together
 from rig.session.store import Session
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Compare sessions with the first of them."""
     together = read_together(arguments)
-    lines = difference_lines(together)
+    lines = comparison.difference_lines(together)
     print_data(together.comparison_json(), lines, as_json=arguments.json)
     if arguments.output is not None:
         if arguments.output.suffix in {".html", ".htm"}:
-            write_atomic(arguments.output, comparison_page(together))
+            write_atomic(arguments.output, comparison.comparison_page(together))
         else:
-            write_figure(arguments.output, draw_comparison(together))
+            write_figure(arguments.output, comparison.draw_comparison(together))
         say(f"comparison: {arguments.output}")
 
 
-def analyze_together(arguments: Namespace) -> int:
+def analyze_together(arguments: Arguments) -> int:
     """Print the results of several sessions in one joint fit, as ``rig analyze A B`` does."""
     together = read_together(arguments)
-    print_data(together.json(), pooled_lines(together), as_json=arguments.json)
+    print_data(together.json(), comparison.pooled_lines(together), as_json=arguments.json)
     return VOID if together.void else 0
 
 
-def read_together(arguments: Namespace) -> TogetherResults:
+def read_together(arguments: Arguments) -> TogetherResults:
     """Analyse the sessions of a command line together."""
     with ExitStack() as open_files:
         files = [

@@ -1,10 +1,10 @@
 """``rig completion``."""
 
-from argparse import Namespace
-
 from argcomplete.shell_integration import shellcode
 
+from rig.commands.output import Arguments
 
-def main(arguments: Namespace) -> None:
+
+def main(arguments: Arguments) -> None:
     """Print what a shell reads to complete commands, options, choices and files."""
     print(shellcode(["rig"], shell=arguments.shell))

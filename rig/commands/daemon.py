@@ -5,11 +5,10 @@ import logging
 import os
 import queue
 import threading
-from argparse import Namespace
 from contextlib import closing, nullcontext, suppress
 
 from rig.board.process import BoardProcess
-from rig.commands.output import say
+from rig.commands.output import Arguments, say
 from rig.daemon.server import Server
 from rig.daemon.socket_path import default_socket, require_sockets
 from rig.link.port import check_url
@@ -49,7 +48,7 @@ class StderrHandler(logging.Handler):
                 os.write(2, f"{line}\n".encode())  # past Python's buffer and its lock
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Own a port and serve clients, in the foreground, until a signal or the idle time ends it."""
     require_sockets()
     check_url(arguments.port)

@@ -3,7 +3,6 @@
 import json
 import os
 import sys
-from argparse import Namespace
 from datetime import UTC, datetime
 from pathlib import Path
 from shlex import quote
@@ -11,7 +10,7 @@ from shlex import quote
 from rig.analysis.result import GOOD
 from rig.analysis.session import Analysis
 from rig.commands import report
-from rig.commands.output import exit_code, goes_on, say
+from rig.commands.output import Arguments, exit_code, goes_on, say
 from rig.files import make_folder, write_atomic
 from rig.measurands import MEASURANDS
 from rig.ports import truth_file
@@ -25,7 +24,7 @@ _PROTOCOL = "inclined-uniform"
 _REPEATS = "repeats: 12 "
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Arguments) -> int:
     """Drop the paper's chains in simulation, and say how well the truth was found."""
     folder = make_folder(arguments.output or f"out/demo-{datetime.now(UTC):%Y%m%dT%H%M%SZ}")
     protocol, session = (folder / f"{_PROTOCOL}.{end}" for end in ("yaml", "session"))
@@ -42,7 +41,7 @@ def main(arguments: Namespace) -> int:
         print("\n".join(["SIMULATED DATA", *beside_truth(analysis, session)]))
         page = folder / "report.html"
         usual = {"bars": "U95", "fresh": False, "estimate": False, "pdf": None}
-        code = report.main(Namespace(session=session, output=page, figures=folder, **usual))
+        code = report.main(Arguments(session=session, output=page, figures=folder, **usual))
     # A browser in a terminal would be in the way.
     has_screen = sys.platform == "darwin" or {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()
     if arguments.open or (has_screen and sys.stdout.isatty()):

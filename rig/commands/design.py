@@ -1,33 +1,29 @@
 """``rig design``."""
 
-from argparse import Namespace
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 from rig.analysis.components import Components, priors
-from rig.commands.output import print_data, say
+from rig.commands.output import Arguments, print_data, say
 from rig.design.cases import cases
 from rig.design.forecast import GateLayout, forecast
 from rig.design.rewriting import rewrite_heights
 from rig.design.search import better, room
 from rig.design.trials import readable, trials, trials_text
-from rig.errors import InputError
 from rig.files import write_atomic
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_measurable
 from rig.protocol.protocol import Protocol
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.report.estimate import symbol
 from rig.report.numbers import decimals_for, fixed
-from rig.report.templates import lines
+from rig.report.templates import sentence
 from rig.text_table import text_table
 
-SPACING_M = 0.01
 
-
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Predict the uncertainties of a layout, and search for a better layout."""
     protocol = reader.read(arguments.protocol)
     check_measurable(protocol)
@@ -36,9 +32,9 @@ def main(arguments: Namespace) -> None:
         protocol = replace(protocol, plan=replace(protocol.plan, repeats=arguments.repeats))
     learned = arguments.learned
     components = _read_scatter(learned, protocol) if learned else priors(protocol)
-    limits = room(protocol, arguments.lowest, arguments.highest, arguments.spacing or SPACING_M)
+    limits = room(protocol, arguments.lowest, arguments.highest, arguments.spacing)
     if limits.lowest > limits.highest:
-        raise make_error(InputError, "beams_reversed")
+        raise rig_error("beams_reversed")
     layouts: dict[str, Any] = {
         "runs": len(protocol.plan.inclines) * protocol.plan.repeats,
         "scatter": "learned" if learned else "stated",
@@ -60,10 +56,10 @@ def _read_scatter(path: str, protocol: Protocol) -> Components:
 
     with Session.open(path, readonly=True) as session:
         if (protocol_of(session).surface is None) != (protocol.surface is None):
-            raise make_error(InputError, "scatter_unlike", path=path, protocol=protocol.title)
+            raise rig_error("scatter_unlike", path=path, protocol=protocol.title)
         joint = complete_analysis(session).joint
     if joint is None:
-        raise make_error(InputError, "scatter_unknown", path=path)
+        raise rig_error("scatter_unknown", path=path)
     return joint.components
 
 
@@ -100,17 +96,10 @@ def _forecast(protocol: Protocol, components: Components) -> dict[str, Any]:
 def design_lines(design: Mapping[str, Any]) -> list[str]:
     """Write layouts and their uncertainties, for a terminal."""
     layouts = {name: design[name] for name in ("current", "proposed") if name in design}
-    cells = {name: _uncertainties(layout) for name, layout in layouts.items()}
-    rows = [[name, *(column[name] for column in cells.values())] for name in cells["current"]]
-    text = [
-        f"expected standard uncertainties of {design['runs']} runs, with the {design['scatter']} "
-        "scatter",
-        "",
-        *text_table([["quantity", *layouts], *rows], left={0}, rule=True),
-    ]
-    for name, layout in layouts.items():
-        text += ["", *lines("layout", name, layout)]
-    return text
+    cells = [_uncertainties(layout) for layout in layouts.values()]
+    rows = [[name, *(column[name] for column in cells)] for name in cells[0]]
+    table = text_table([["quantity", *layouts], *rows], left={0}, rule=True)
+    return sentence("design", design, table).split("\n")
 
 
 def _uncertainties(layout: Mapping[str, Any]) -> dict[str, str]:

@@ -1,12 +1,11 @@
 """``rig doctor``."""
 
-from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
 from rig.cache.store import CacheFile
-from rig.commands.output import print_findings, say
+from rig.commands.output import Arguments, print_findings, say
 from rig.doctor import computer
 from rig.doctor.board import BOARD_CHECKS
 from rig.doctor.session import check_session
@@ -18,7 +17,7 @@ from rig.selftest.run import run_checks
 from rig.usb.listing import serial_ports
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Arguments) -> int:
     """Say what is well, and of what is not, what to do."""
     if arguments.clear_cache:
         CacheFile().clear()

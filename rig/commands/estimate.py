@@ -1,10 +1,8 @@
 """``rig estimate``."""
 
-from argparse import Namespace
 from dataclasses import replace
-from typing import Any
 
-from rig.commands.output import print_json, progress, say, tell_damage
+from rig.commands.output import Arguments, print_data, progress, say, tell_damage
 from rig.files import make_folder
 from rig.report.canvas import write_figure
 from rig.report.estimate import estimate_text
@@ -15,7 +13,7 @@ from rig.sections import Sections
 from rig.session.store import Session
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Arguments) -> int:
     """Estimate the parameters of the impacts from a session."""
     with Session.open(arguments.session, readonly=True) as session:
         folder = None if arguments.output is None else make_folder(arguments.output)
@@ -25,14 +23,12 @@ def main(arguments: Namespace) -> int:
         estimate = session_estimate(session, outcome, progress, fresh=fresh)
     analysis, simulated = outcome.analysis, outcome.simulated
     likeness = None if analysis.rig is None else analysis.rig.likeness
-    sections = Sections()
-    if arguments.json:
-        members: dict[str, Any] = {"simulated": simulated, **estimate.json()}
-        print_json(members if likeness is None else members | {"likeness": likeness.json()})
-    else:
-        if likeness is not None and not likeness.like:
-            print(likeness.sentence)
-        print(estimate_text(estimate, sections, simulated=simulated))
+    sections, data = Sections(), {"simulated": simulated, **estimate.json()}
+    text = estimate_text(estimate, sections, simulated=simulated)
+    if likeness is not None:
+        data |= {"likeness": likeness.json()}
+        text = text if likeness.like else f"{likeness.sentence}\n{text}"
+    print_data(data, text.split("\n"), as_json=arguments.json)
     if folder is not None:
         for name, figure in estimate_pictures(estimate, sections).items():
             write_figure(folder / f"{name}.svg", replace(figure, simulated=simulated))

@@ -1,15 +1,13 @@
 """``rig export``."""
 
-from argparse import Namespace
-
 from rig.bundle.tables import csv_files
-from rig.commands.output import progress, say, tell_damage
+from rig.commands.output import Arguments, progress, say, tell_damage
 from rig.files import make_folder, write_atomic
 from rig.results import results
 from rig.session.store import Session
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Arguments) -> int:
     """Write a session as CSV files, or as one file that another person can check."""
     if arguments.bundle is not None:
         from rig.commands.bundling import write_bundle  # noqa: PLC0415 - it draws a report

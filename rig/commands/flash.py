@@ -1,25 +1,20 @@
 """``rig flash``."""
 
-from argparse import Namespace
-
-from rig.commands.output import goes_on, say
-from rig.errors import InputError
+from rig.commands.output import Arguments, goes_on, say
 from rig.flash.boards import DRIVE, TARGETS, UNSEEN
 from rig.flash.steps import flash
-from rig.reasons import make_error
+from rig.reasons import rig_error
+from rig.report.templates import sentence
 
 
 @goes_on("the firmware may be incomplete; run the same command again")
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Flash a board and say what it is now."""
     board, avrdude, drive = arguments.board, arguments.avrdude, arguments.drive
     if TARGETS[board] is DRIVE and avrdude is not None:
-        raise make_error(InputError, "avrdude_for_pico", board=DRIVE.board.name)
+        raise rig_error("avrdude_for_pico", board=DRIVE.board.name)
     if TARGETS[board] is not DRIVE and drive is not None:
-        raise make_error(InputError, "drive_of_arduino", board=DRIVE.board.name)
+        raise rig_error("drive_of_arduino", board=DRIVE.board.name)
     identity = flash(board, arguments.port, arguments.hex, avrdude or drive, say)
-    print(
-        f"{identity.board}, {identity.firmware}, {identity.gates} gates, "
-        f"id {identity.unique_id.hex()}: flashed and verified"
-    )
+    print(sentence("flashed", identity.json()))
     say(f"this firmware was {UNSEEN}")

@@ -1,12 +1,10 @@
 """``rig gate``."""
 
-from argparse import Namespace
-
-from rig.commands.output import say
+from rig.commands.output import Arguments, say
 from rig.model.photogate import design_photogate
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Print a photogate's resistors, and what follows from them."""
     how = arguments.distance, arguments.slit, arguments.led, arguments.detector
     for name, value in design_photogate(*how).items():

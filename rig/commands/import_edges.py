@@ -3,38 +3,33 @@
 from __future__ import annotations
 
 import hashlib
-from collections import Counter
+from collections.abc import Sequence
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.analysis.chain_records import chain_records
 from rig.analysis.components import priors
 from rig.analysis.drop import DropCase
 from rig.analysis.gravity import check_gravity
 from rig.analysis.identify import log_evidence, most_votes
+from rig.analysis.result import DropResult
 from rig.clock.calibration import TimeScale
 from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.clock.host import SystemClock
-from rig.commands.output import say
+from rig.commands.output import Arguments, say
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_measurable, with_gates
 from rig.protocol.plan import runs
+from rig.protocol.protocol import Protocol
 from rig.reasons import make_reason, reasons_json
+from rig.records import Drop
+from rig.report.templates import lines
 from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.timers.importing import FallMatch, Import, import_drops
 from rig.timers.moments import TICK_HZ
 from rig.timers.problems import refusal
-
-if TYPE_CHECKING:
-    from argparse import Namespace
-    from collections.abc import Iterator, Sequence
-
-    from rig.analysis.result import DropResult
-    from rig.protocol.protocol import Protocol
-    from rig.records import Drop
 
 _COMPARED = 3
 """Drops that are compared with falls: as many as tell a way of reading from another."""
@@ -43,7 +38,7 @@ _MOST = 120
 of how long they last, so that those that are least like the others are among them."""
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Make a session from a file, or say how it would be read."""
     protocol = reader.read(arguments.protocol)
     source, events = Path(arguments.protocol).name, Path(arguments.events).name
@@ -53,7 +48,7 @@ def main(arguments: Namespace) -> None:
     for note in imported.notes:
         say(note.text)
     if arguments.dry_run:
-        print("\n".join([*imported.lines, *_describe_drops(drops)]))
+        print("\n".join([*imported.lines, *lines("imported", drops)]))
         return
     if arguments.session is None:
         raise refusal("--session", "no_session_file")
@@ -76,7 +71,7 @@ def main(arguments: Namespace) -> None:
     say(f"{sum(len(drop.edges) for drop in drops)} edges of {counted} → {arguments.session}")
 
 
-def import_with_protocol(protocol: Protocol, arguments: Namespace) -> Import:
+def import_with_protocol(protocol: Protocol, arguments: Arguments) -> Import:
     """Read the drops of any timer's file as a protocol's falls bear them out."""
     gates = sorted(check_gates(protocol).gates, key=lambda gate: -gate.height)
     bars = max(side.chain.rods for side in protocol.chains.values())
@@ -114,15 +109,6 @@ def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMat
         text += f"; g {sum(gravity) / len(gravity):.2f} m/s²"
     check = check_gravity(protocol, results)
     return FallMatch(*min(shares), evidence, text, check.doubts if check else ())
-
-
-def _describe_drops(drops: Sequence[Drop]) -> Iterator[str]:
-    """Describe what would be imported, a line a run."""
-    for drop in drops:
-        by_channel = Counter(edge.channel for edge in drop.edges)
-        counts = ", ".join(f"{channel}: {n}" for channel, n in sorted(by_channel.items()))
-        span = (drop.edges[-1].tick - drop.edges[0].tick) / drop.tick_hz
-        yield f"run {drop.run}: {len(drop.edges)} edges in {span:.4g} s; by channel {counts}"
 
 
 def _check_plan(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:

@@ -5,6 +5,7 @@ import math
 import re
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -63,17 +64,10 @@ def _place(names: str, text: str) -> Path:
     return place
 
 
-def _new_place(names: str, text: str) -> Path:
-    """Read a place as `_place` does where no file is yet: people wrote what it would replace."""
-    place = _place(names, text)
-    check_new(place)
-    return place
-
-
-def _quantity(text: str, dimension: str) -> float:
+def _quantity(dimension: str, text: str) -> float:
     """Read a quantity; units, with fractions and decimals, are loaded only for one."""
     units = import_module("rig.units")
-    return float(units.parse(text, units.Dimension[dimension]).value)
+    return float(units.parse(text, units.DIMENSIONS[dimension]).value)
 
 
 def _socket(name: str) -> Any:
@@ -92,9 +86,7 @@ KINDS: dict[str, dict[str, Any]] = {
         lambda mask: mask < 1 << GATES,
     ),
     "length": _accept(
-        "a length above 0, such as 60 mm",
-        lambda text: _quantity(text, "LENGTH"),
-        lambda metres: metres > 0.0,
+        "a length above 0, such as 60 mm", partial(_quantity, "LENGTH"), lambda metres: metres > 0.0
     ),
     "name": _NAME,
     "rig": {"dest": "socket", "type": _socket},
@@ -113,13 +105,11 @@ KINDS: dict[str, dict[str, Any]] = {
     "seconds": _accept("a time in seconds above 0", float, lambda s: 0.0 < s < math.inf),
     "seed": _accept("a whole number from 0 to 2^63", int, lambda n: 0 <= n < 1 << 63),
     "share": _accept(
-        "a share from 0 to 10 %, as in 50 ppm",
-        lambda text: _quantity(text, "NUMBER"),
-        lambda share: 0.0 <= share < 0.1,
+        "a share from 0 to 10 %, as in 50 ppm", partial(_quantity, "NUMBER"), lambda x: 0 <= x < 0.1
     ),
     "trials": _accept("a whole number from 2", int, lambda trials: trials >= 2),
     "file": {"type": _place},
-    "new": {"type": _new_place},
+    "new": {"type": lambda names, text: check_new(_place(names, text))},
     "path": {"type": lambda text: Path(text) if text else None},
     "formats": {"action": _ListFormats, "nargs": 0},
 }

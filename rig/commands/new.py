@@ -2,15 +2,13 @@
 
 import sys
 import tempfile
-from argparse import Namespace
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from rig.boards import BOARDS, GATES
-from rig.commands.output import print_results
-from rig.errors import InputError
+from rig.commands.output import Arguments, print_results
 from rig.files import check_new, write_atomic
 from rig.predictions import notes
 from rig.protocol import reader
@@ -18,27 +16,25 @@ from rig.protocol.describe import describe
 from rig.protocol.draft import SCENES, Draft, Scene, draft_text
 from rig.protocol.measurable import check_recordable
 from rig.ready import WIRED
+from rig.reasons import rig_error
 from rig.report.canvas import figure_file
 from rig.report.mounting import mounting_figure
 from rig.report.wiring import wiring_drawing
 from rig.runner import Operator, run_protocol
 from rig.streams import ask, say
+from rig.text_rows import read_rows
 
-_COEFFICIENTS = "coefficients"
 _SIZES = ("gates", "rods", "length", "diameter", "drop", "repeats")
 """Answers that a draft takes as they are."""
-_MANY_INCLINES = "30 deg, 40 deg, 50 deg, 60 deg, 70 deg"
-"""Where the coefficients are to be measured, if no inclines are given."""
 _CHOICE = Path(__file__).with_name("choose.txt").read_text("utf-8")
 """What somebody has, the ready protocol for it, and the command; README begins with it too."""
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Arguments) -> int:
     """Write a protocol, draw and describe it, and try it in simulation."""
     path: Path = arguments.output
-    places = {word: path.with_name(f"{path.stem}-{word}.svg") for word in ("mounting", "wiring")}
-    for place in places.values():
-        check_new(place)
+    drawings = ("mounting", "wiring")
+    places = {word: check_new(path.with_name(f"{path.stem}-{word}.svg")) for word in drawings}
     board, draft = _read_answers(arguments, path)
     text = draft_text(draft)
     protocol = reader.parse(text, str(path))
@@ -59,24 +55,23 @@ def main(arguments: Namespace) -> int:
     return _simulate(draft)
 
 
-def _read_answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
+def _read_answers(arguments: Arguments, path: Path) -> tuple[str, Draft]:
     """Return the board and the draft; ask for what the command line leaves open."""
     if arguments.scene is None and _can_ask(arguments):
         say(f"What have you got?\n{_CHOICE.replace('`', '')}")
     word = _ask(arguments, "scene", "What do you drop?", "object", SCENES)
     scene: Scene = next(name for name in SCENES if name == word)
-    answers: dict[str, Any] = {"rods": "1", "length": "", "incline": ""}
-    lines = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
-    rows = [[*map(str.strip, line.split("|"))] for line in lines if not line.startswith("#")]
+    answers: dict[str, Any] = {}
+    rows = read_rows(__file__)
     fitting = [row for row in rows if not row[0] or scene in row[0].split()]
     for option in {row[1] for row in rows} - {row[1] for row in fitting}:
         if getattr(arguments, option) is not None:
-            raise InputError(f"--{option}: not in the scene {scene}", "leave it out")
-    for _, option, question, usual in fitting:
-        many = option == "incline" and answers.get("aim") == _COEFFICIENTS
-        default = _MANY_INCLINES if many else usual
-        words = {"board": (*BOARDS, "other"), "aim": (usual, _COEFFICIENTS)}.get(option, ())
-        answers[option] = _ask(arguments, option, question, default, words)
+            raise rig_error("not_in_scene", option=option, name=scene)
+    for where, option, question, usual, *words in rows:
+        here = not where or {scene, answers.get("aim")} & {*where.split()}
+        if here and option not in answers:
+            answers[option] = _ask(arguments, option, question, usual, " ".join(words).split())
+    answers = {"rods": "1", "length": "", "incline": ""} | answers
     for option, limit in {"gates": GATES, "rods": 1000, "repeats": 1000}.items():
         answers[option] = _count(option, answers[option], limit)
     title = arguments.title or path.stem.replace("-", " ").replace("_", " ")
@@ -84,11 +79,11 @@ def _read_answers(arguments: Namespace, path: Path) -> tuple[str, Draft]:
     return answers["board"], Draft(title=title, scene=scene, inclines=inclines, **sizes)
 
 
-def _can_ask(arguments: Namespace) -> bool:
+def _can_ask(arguments: Arguments) -> bool:
     return not arguments.yes and sys.stdin.isatty()
 
 
-def _ask(arguments: Namespace, option: str, words: str, usual: str, accepted: Sequence[str]) -> str:
+def _ask(arguments: Arguments, option: str, words: str, usual: str, accepted: Sequence[str]) -> str:
     """Return the answer of the command line or of the user, or the default.
 
     `accepted` is empty where any answer is.
@@ -109,7 +104,7 @@ def _ask(arguments: Namespace, option: str, words: str, usual: str, accepted: Se
 
 def _count(name: str, text: str, limit: int) -> int:
     if not text.isdecimal() or not 1 <= int(text) <= limit:
-        raise InputError(f"--{name}: found {text}; accepted: a whole number from 1 to {limit}")
+        raise rig_error("no_such_number", option=name, text=text, limit=limit)
     return int(text)
 
 

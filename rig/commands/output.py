@@ -1,9 +1,10 @@
-"""Results to stdout, narration to stderr."""
+"""What every command uses: its arguments; results to stdout, narration to stderr."""
 
 from __future__ import annotations
 
 import json
 import sys
+from argparse import Namespace
 from contextlib import contextmanager
 from shutil import get_terminal_size
 from textwrap import wrap
@@ -14,13 +15,22 @@ from rig.streams import say as narrate
 from rig.streams import tolerate_broken
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from rig.analysis.session import Analysis
     from rig.results import SessionResults
     from rig.selftest.findings import Finding
 
 VOID = 3
+
+
+class Arguments(Namespace):
+    """What a command line says: each argument by its name in ``command_help.txt``."""
+
+    session: str
+    further: Sequence[str]
+    fresh: bool
+    json: bool
 
 
 def say(line: str) -> None:
@@ -104,16 +114,11 @@ def print_results(outcome: SessionResults, *, as_json: bool, **members: object) 
     if as_json:
         print_json(outcome.json() | members)
     else:
-        if outcome.simulated:
-            print("SIMULATED DATA")
-        if outcome.blind:
-            print("BLIND: results stay hidden until rig unblind SESSION")
-        from rig.report.finding import remarks, void_lines  # noqa: PLC0415
-        from rig.report.parts import summary_table  # noqa: PLC0415 - few commands print one
+        from rig.report import finding, parts, templates  # noqa: PLC0415 - few commands print one
 
-        if not outcome.blind:
-            show(summary_table(outcome.analysis.summary).splitlines())
-        show([*void_lines(outcome.analysis), *outcome.analysis.damage, *remarks(outcome)])
+        means = [] if outcome.blind else parts.summary_table(outcome.analysis.summary).splitlines()
+        show([*templates.lines("stamp", outcome), *means, *finding.void_lines(outcome.analysis)])
+        show([*outcome.analysis.damage, *finding.remarks(outcome)])
     return exit_code(outcome.analysis)
 
 

@@ -1,21 +1,20 @@
 """``rig ports``."""
 
-from argparse import Namespace
 from collections import Counter
-from collections.abc import Mapping
 from contextlib import closing
 from typing import Any
 
-from rig.commands.output import print_data, say
+from rig.commands.output import Arguments, print_data, say
 from rig.errors import DeviceError
 from rig.flash.drive import sees_boot_pico, waiting_drives
 from rig.link.client import Device
 from rig.link.port import open_port, port_clock
 from rig.reasons import make_reason
+from rig.report.templates import sentence
 from rig.usb.listing import SerialPort, serial_ports
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """List the ports, and ask who is there where that is wanted."""
     ports = serial_ports()
     chosen = arguments.identify
@@ -24,7 +23,8 @@ def main(arguments: Namespace) -> None:
     why, listed = "not a serial port of this computer", {port.path for port in ports}
     ports += [SerialPort(path, skipped=why) for path in chosen or () if path not in listed]
     records = [_describe(port, ask=port.path in (chosen or ())) for port in ports]
-    print_data({"ports": records}, map(_line, records), as_json=arguments.json)
+    lines = (sentence("port", record) for record in records)
+    print_data({"ports": records}, lines, as_json=arguments.json)
     if arguments.json:
         return
     ids = Counter(record["identity"]["unique_id"] for record in records if record["identity"])
@@ -49,19 +49,3 @@ def _describe(port: SerialPort, *, ask: bool) -> dict[str, Any]:
         except DeviceError as error:
             trouble = str(error)
     return record | {"identity": identity, "trouble": trouble}
-
-
-def _line(port: Mapping[str, Any]) -> str:
-    parts = [port["path"]]
-    if None not in {port["vid"], port["pid"]}:
-        parts.append(f"USB {port['vid']:04x}:{port['pid']:04x}")
-    if port["serial_number"]:
-        parts.append(f"serial number {port['serial_number']}")
-    parts += filter(None, dict.fromkeys([port["product"], port["kind"]]))
-    if identity := port["identity"]:
-        parts.append(f"{identity['board']}, {identity['firmware']}, id {identity['unique_id']}")
-    elif port["trouble"]:
-        parts.append(port["trouble"].replace("\n", ";"))
-    else:
-        parts.append(f"skipped: {port['skipped']}" if port["skipped"] else "a candidate")
-    return "  ".join(parts)

@@ -1,14 +1,11 @@
 """``rig predict``."""
 
-from argparse import Namespace
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 from rig.analysis.distributions import COVERAGE_95
-from rig.commands.output import print_data, say
+from rig.commands.output import Arguments, print_data, say
 from rig.files import write_atomic
 from rig.measurands import SEPARATION, SPEED, Measurand
 from rig.model.prediction import PredictedIncline
@@ -16,11 +13,11 @@ from rig.predictions import group_notes, predictions
 from rig.protocol import reader
 from rig.protocol.protocol import Protocol
 from rig.report.columns import table_parts
-from rig.report.numbers import degrees, fixed
+from rig.report.numbers import fixed
 from rig.text_table import csv_text
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Print the model's predictions, one an incline, or draw a figure of the paper."""
     if arguments.figure is not None:
         _write_figure(arguments.figure, arguments.output)
@@ -35,12 +32,8 @@ def _write_table(protocol: Protocol, lines: list[PredictedIncline]) -> list[str]
     """Lay predictions out as text, notes below; without columns of what the scene does not have."""
     struck = protocol.surface is not None
     rows = (SEPARATION, SPEED) if protocol.two_chains else (SPEED,)
-    cells: dict[str, Callable[[PredictedIncline], Any]] = {
-        "incline": lambda line: degrees(line.incline_deg) if struck else "",
-        "values": lambda line: {row.name: _value(line, row) for row in rows if struck},
-        "speed": lambda line: None if struck else line.speed_m_s,
-    }
-    (part,) = table_parts("predictions", lines, derived=cells)
+    values = {"values": lambda line: {row.name: _value(line, row) for row in rows}}
+    (part,) = table_parts("predictions" if struck else "fall", lines, derived=values)
     part = replace(part, rows=[[cell or "–" for cell in row] for row in part.rows])
     notes = group_notes(lines)
     if struck:
@@ -57,12 +50,11 @@ def _value(line: PredictedIncline, row: Measurand) -> SimpleNamespace:
 
 def _write_figure(number: int, path: Path) -> None:
     """Write a figure of the paper, and its numbers as CSV beside it."""
-    from rig.report.canvas import write_figure  # noqa: PLC0415 - it needs matplotlib
-    from rig.report.paper import paper_figure  # noqa: PLC0415 - likewise
+    from rig.report import canvas, paper  # noqa: PLC0415 - they need matplotlib
 
     picture = path.with_suffix(".svg") if path.suffix == ".csv" else path
-    drawing, columns = paper_figure(number)
+    drawing, columns = paper.paper_figure(number)
     rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
-    write_figure(picture, drawing)
+    canvas.write_figure(picture, drawing)
     write_atomic(path.with_suffix(".csv"), csv_text(columns, rows))
     say(f"{picture} and {path.with_suffix('.csv')}")

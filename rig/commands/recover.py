@@ -1,14 +1,12 @@
 """``rig recover``."""
 
-from argparse import Namespace
-
-from rig.commands.output import say
+from rig.commands.output import Arguments, say
 from rig.errors import SessionError
 from rig.recover.examine import describe, examine
 from rig.recover.save import save
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Arguments) -> int:
     """Say what is whole; save it where that is wanted."""
     damage = examine(arguments.session)
     print("\n".join(describe(damage)))

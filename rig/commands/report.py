@@ -1,12 +1,11 @@
 """``rig report``."""
 
-from argparse import Namespace
 from functools import partial
 from typing import NamedTuple
 
 from rig.analysis.result import GOOD
 from rig.cache.entry import recall
-from rig.commands.output import progress, say, stage, tell_damage
+from rig.commands.output import Arguments, progress, say, stage, tell_damage
 from rig.estimate.session import SessionEstimate
 from rig.files import write_atomic
 from rig.report.canvas import write_figures
@@ -28,7 +27,7 @@ class Report(NamedTuple):
     failed: tuple[str, ...]
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Arguments) -> int:
     """Write a session's report."""
     if arguments.pdf is not None:
         from rig.report.pdf import write_pdf  # noqa: PLC0415 - an extra that few need
@@ -61,9 +60,8 @@ def make_report(
     sections, estimated = Sections(), None
     if estimate:
         stage("estimating the impacts")
-        estimated = sections.make(
-            "The estimate of the impacts", lambda: _estimate(session, outcome, fresh=fresh)
-        )
+        with sections.alone("The estimate of the impacts"):
+            estimated = _estimate(session, outcome, fresh=fresh)
     stage("writing the page")
     html, figures = page_html(session_page(session, outcome, bars, estimated, sections))
     stage("")

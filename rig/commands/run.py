@@ -1,9 +1,8 @@
 """``rig run``."""
 
 import sys
-from argparse import Namespace
 
-from rig.commands.output import goes_on, print_results
+from rig.commands.output import Arguments, goes_on, print_results
 from rig.report.finding import finding
 from rig.report.templates import sentence
 from rig.runner import Operator, run_protocol
@@ -12,7 +11,7 @@ from rig.streams import ask, say
 _GO_ON = "  then press Enter (Ctrl-C stops; the same command continues) "
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Arguments) -> int:
     """Carry out a protocol."""
     attended = not arguments.yes and sys.stdin.isatty()
     operator = Operator(say, _ask if attended else None)

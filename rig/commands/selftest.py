@@ -1,10 +1,9 @@
 """``rig selftest``."""
 
-from argparse import Namespace
 from contextlib import closing, nullcontext
 from pathlib import Path
 
-from rig.commands.output import print_findings, say
+from rig.commands.output import Arguments, print_findings, say
 from rig.errors import DeviceError
 from rig.link.port import open_port
 from rig.ports import add_settings
@@ -13,7 +12,7 @@ from rig.selftest.board import SelftestOptions
 from rig.selftest.run import selftest
 
 
-def main(arguments: Namespace) -> int:
+def main(arguments: Arguments) -> int:
     """Make all checks, and say what to do about those that failed."""
     gates, url = arguments.gates, arguments.port
     if arguments.protocol is not None:

@@ -1,18 +1,17 @@
 """``rig service install``."""
 
 import sys
-from argparse import Namespace
 from pathlib import Path
 
 import platformdirs
 
-from rig.commands.output import say
+from rig.commands.output import Arguments, say
 from rig.files import make_folder, write_atomic
 from rig.ready import find_resource
 from rig.usb.listing import sole_port
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Write the user's systemd unit that keeps a daemon running at the board's port."""
     rig, port = arguments.name, _lasting_name(arguments.port or sole_port())
     template = "chainrig@.service" if rig else "chainrig.service"

@@ -3,12 +3,20 @@
 import json
 from argparse import Namespace
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 
 from rig.bench.findings import Findings
 from rig.commands.output import print_data
 from rig.files import make_folder, write_atomic
 from rig.text_table import csv_text
+
+
+def main(arguments: Namespace) -> int:
+    """Carry out a study of ``rig bench``."""
+    name = arguments.command.removeprefix("bench ")
+    place = "rig.bench.scenes" if name == "scenes" else f"rig.commands.bench_{name}"
+    return carry_out(name, import_module(place).run, arguments)
 
 
 def carry_out(

@@ -2,24 +2,23 @@
 
 import sys
 import time
-from argparse import Namespace
 from importlib import import_module
 from pathlib import Path
 
-from rig.commands.output import goes_on, say, stage
-from rig.errors import InputError
+from rig.commands.output import Arguments, goes_on, say, stage
 from rig.files import replacing
 from rig.protocol import reader
 from rig.protocol.protocol import Protocol
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.report.canvas import ENDINGS, write_figure
+from rig.report.templates import sentence
 from rig.sweep.compute import NO_ANSWER, PILE, Swept, chunk_length, compute
 from rig.sweep.executor import executor
 from rig.sweep.layout import Layout, lay_out
 from rig.sweep.tables import provenance, write_csv, write_npz
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Compute a sweep and write it to a file."""
     output: Path = arguments.output
     protocol = reader.read(arguments.protocol)
@@ -30,7 +29,9 @@ def main(arguments: Namespace) -> None:
     with goes_on("nothing was written"):
         swept = _compute(layout, arguments.jobs, arguments.cluster)
         _write(output, protocol, layout, swept)
-    say(f"{output}: {_summary(swept)}")
+    beyond, notes = ~swept.in_domain, swept.notes
+    counts = (points.sum() for points in (beyond, notes & NO_ANSWER > 0, notes & PILE > 0))
+    say(f"{output}: {sentence('swept', notes.size, *counts)}")
 
 
 def _compute(layout: Layout, jobs: int | None, address: str | None) -> Swept:
@@ -75,17 +76,6 @@ def _check_drawable(layout: Layout) -> None:
     if layout.layered:
         *first, last = (f"{value:g}" for value in layout.values["incline"])
         inclines = ", ".join([*first, last])
-        raise make_error(InputError, "sweep_of_inclines", inclines=inclines, last=last)
+        raise rig_error("sweep_of_inclines", inclines=inclines, last=last)
     if len(layout.axes) > 2:
-        raise make_error(InputError, "sweep_of_axes", axes=len(layout.axes))
-
-
-def _summary(swept: Swept) -> str:
-    """Count the points, and those of which a reader of the file should know."""
-    counts = {
-        "beyond the model's domain": ~swept.in_domain,
-        "without an answer": (swept.notes & NO_ANSWER) > 0,
-        "on the pile": (swept.notes & PILE) > 0,
-    }
-    parts = [f"{points.sum()} {words}" for words, points in counts.items() if points.any()]
-    return ", ".join([f"{swept.notes.size} points", *parts])
+        raise rig_error("sweep_of_axes", axes=len(layout.axes))

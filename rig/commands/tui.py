@@ -4,27 +4,24 @@ import asyncio
 import gc
 import os
 import sys
-from argparse import Namespace
 from datetime import UTC, datetime
 from pathlib import Path
 
+from rig.commands.output import Arguments
 from rig.daemon.socket_path import require_sockets
-from rig.errors import InputError
 from rig.ports import check_name
+from rig.reasons import rig_error
 from rig.tui.app import RigApp
 from rig.tui.context import Options, ascii_only
 from rig.tui.keys import read_keys
 
 
-def main(arguments: Namespace) -> None:
+def main(arguments: Arguments) -> None:
     """Show the session, and carry it out."""
     options = _options(arguments)
     keys = read_keys(arguments.keys)
     if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        raise InputError(
-            "rig tui needs a terminal",
-            "without a terminal: rig run PROTOCOL --port URL --session FILE",
-        )
+        raise rig_error("no_terminal")
     # What is loaded stays: not looking through it for garbage saves a frame its latest 60 ms.
     asyncio.run(_show(RigApp(options, keys, loaded=gc.freeze)))
 
@@ -48,21 +45,17 @@ async def _show(app: RigApp) -> None:
         raise asyncio.CancelledError
 
 
-def _options(arguments: Namespace) -> Options:
-    if arguments.protocol:
-        files: tuple[Path, ...] = (Path(arguments.protocol),)
-    else:
-        folders = (Path("protocols"), Path())
-        files = tuple(path for folder in folders for path in sorted(folder.glob("[!.]*.yaml")))
-    offline = bool(arguments.session) and not (
-        arguments.port or arguments.protocol or arguments.socket
-    )
+def _options(arguments: Arguments) -> Options:
+    folders = Path("protocols"), Path()
+    files = [path for folder in folders for path in sorted(folder.glob("[!.]*.yaml"))]
+    live = arguments.port or arguments.protocol or arguments.socket
+    offline = bool(arguments.session) and not live
     if not offline:
         require_sockets()
     check_name(arguments.port or "")  # before a daemon is started for it
     fresh = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}.session"
     return Options(
-        files=files,
+        files=(Path(arguments.protocol),) if arguments.protocol else tuple(files),
         port=arguments.port or "",
         session=Path(arguments.session or fresh),
         seed=arguments.seed,

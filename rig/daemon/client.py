@@ -22,8 +22,8 @@ from rig.daemon import rpc
 from rig.daemon.lease import LEASE_S, ControlError
 from rig.daemon.replica import Replica
 from rig.daemon.socket_path import check_folder
-from rig.errors import DeviceError, DeviceTimeoutError, RigError
-from rig.reasons import Reason, make_error
+from rig.errors import RigError
+from rig.reasons import Reason, make_error, rig_error
 from rig.recorder.interrupts import Interrupts
 from rig.records import Drop
 from rig.session.reading import Reader
@@ -82,7 +82,7 @@ class Line:
         self._thread.start()
         try:
             hello = self.ask("hello", api=rpc.API, client=name)
-            silent = make_error(DeviceTimeoutError, "daemon_silent", path=path, patience_s=HELLO_S)
+            silent = rig_error("daemon_silent", path=path, patience_s=HELLO_S)
             self.daemon: dict[str, Any] = _result(hello, HELLO_S, silent)
         except BaseException:
             self.close()
@@ -185,7 +185,7 @@ class Client:
             As the daemon raised it, or it is gone.
         """
         answer = self.line.ask(method, **params)
-        silent = make_error(DeviceTimeoutError, "daemon_no_answer", method=method)
+        silent = rig_error("daemon_no_answer", method=method)
         # What has fallen is recorded whole.
         with nullcontext() if method == "collect" else self._interrupts.let_through():
             return _result(answer, patience, silent)
@@ -250,7 +250,7 @@ class Client:
         self.call("collect", run=run, attempt=attempt, patience=2 * _ANSWER_S)
         drop = self.session.drop(run, attempt)
         if drop is None:
-            raise make_error(DeviceError, "not_recorded", run=run, attempt=attempt)
+            raise rig_error("not_recorded", run=run, attempt=attempt)
         return drop
 
     def log_state(
@@ -351,18 +351,18 @@ def _message_of(line: bytes) -> dict[str, Any]:
     except ValueError:
         message = None
     if not isinstance(message, dict):
-        raise make_error(DeviceError, "not_a_daemon")
+        raise rig_error("not_a_daemon")
     return message
 
 
-def _result(answer: Future[Any], patience_s: float, silent: DeviceError) -> Any:
+def _result(answer: Future[Any], patience_s: float, silent: RigError) -> Any:
     if wait([answer], patience_s).not_done:
         raise silent
     return answer.result()
 
 
 def _gone(why: object) -> RigError:
-    return make_error(DeviceError, "daemon_gone", text=why)
+    return rig_error("daemon_gone", text=why)
 
 
 def _reach(path: Path) -> socket.socket:
@@ -389,6 +389,6 @@ def _reach(path: Path) -> socket.socket:
             busy = make_error(rpc.BusyError, "daemon_busy", path=path, patience_s=_REACH_S)
             raise busy from error
         except OSError as error:
-            raise make_error(DeviceError, "no_daemon", path=path, text=error) from error
+            raise rig_error("no_daemon", path=path, text=error) from error
         stack.pop_all()
     return line

@@ -14,8 +14,8 @@ from rig.daemon.lease import Lease
 from rig.daemon.service import METHODS
 from rig.daemon.socket_path import default_socket
 from rig.daemon.worker import Worker
-from rig.errors import DeviceError, RigError
-from rig.reasons import make_error
+from rig.errors import RigError
+from rig.reasons import rig_error
 from rig.recorder.interrupts import Interrupts
 from rig.recorder.published import PublishedState
 
@@ -86,7 +86,7 @@ def connect(
         # A board that was plugged in again may have another path than the daemon was told.
         if not any(_is_same(line.daemon.get(name, ""), url) for name in ("port", "path")):
             line.close()
-            raise make_error(DeviceError, "daemon_port", port=line.daemon["port"], wanted=url)
+            raise rig_error("daemon_port", port=line.daemon["port"], wanted=url)
     except RigError:
         if socket is not None:
             raise

@@ -9,8 +9,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from rig.daemon.socket_path import prepare_folder
-from rig.errors import InputError
-from rig.reasons import make_error
+from rig.reasons import rig_error
 
 _LOCK_S = 0.1  # one that ends takes its lock's file away, and the next tries again
 _BACKLOG = 1024  # that many may come at once; the kernel has a limit of its own besides
@@ -50,7 +49,7 @@ class Door:
         except OSError as error:
             self.listener.close()
             code = "daemon_there" if isinstance(error, Timeout) else "place_unusable"
-            raise make_error(InputError, code, path=path, text=error) from error
+            raise rig_error(code, path=path, text=error) from error
         path.chmod(0o600)
         self.listener.listen(_BACKLOG)
         self.listener.setblocking(False)

@@ -13,7 +13,7 @@ from rig.errors import DeviceError, DeviceTimeoutError, InputError, RigError, Se
 from rig.link.messages import DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.printable import one_line
-from rig.reasons import make_error, read_record
+from rig.reasons import make_error, read_record, rig_error
 from rig.recorder.interrupts import StoppedError
 
 log = logging.getLogger(__name__)
@@ -121,7 +121,7 @@ def in_words(error: Exception) -> RigError:
     if isinstance(error, RigError):
         return error
     if isinstance(error, OSError) and error.filename:  # of a file that a client has named
-        return make_error(InputError, "file_failed", path=str(error.filename), text=error)
+        return rig_error("file_failed", path=str(error.filename), text=error)
     log.error("internal error", exc_info=error)
     return make_error(RigError, "internal_error")
 

@@ -24,7 +24,7 @@ from rig.daemon.socket_path import peer_uid
 from rig.errors import InputError
 from rig.files import make_folder, state_folder
 from rig.ports import is_simulated
-from rig.reasons import make_error
+from rig.reasons import make_error, rig_error
 from rig.recorder.published import PublishedState
 
 Onlooker = Callable[[PublishedState], Coroutine[Any, Any, None]]
@@ -190,7 +190,7 @@ class Server:
             self._see_worker()
             self._see_rest()
             if not door.there() and not self.published.get("clients"):
-                raise make_error(InputError, "socket_lost", path=door.path, folder=state_folder())
+                raise rig_error("socket_lost", path=door.path, folder=state_folder())
 
     def _see_lease(self) -> None:
         """See that control lapses also when its holder says nothing."""

@@ -18,9 +18,8 @@ from rig.daemon.connection import CLIENTS, Connection
 from rig.daemon.lease import Lease
 from rig.daemon.publisher import Publisher
 from rig.daemon.worker import Worker
-from rig.errors import DeviceTimeoutError
 from rig.printable import encodable, one_line
-from rig.reasons import make_error, plain_reason, read_record
+from rig.reasons import make_error, plain_reason, read_record, rig_error
 from rig.recorder.controller import Controller
 from rig.recorder.published import PublishedState
 from rig.session.schema import RunState
@@ -172,7 +171,7 @@ async def _stop(service: Service, client: Connection, reason: str) -> None:
     if not done.done():
         stalled = service.worker.stall()
         because = f": {stalled.message}" if stalled else ""
-        raise make_error(DeviceTimeoutError, "stop_unknown", because=because)
+        raise rig_error("stop_unknown", because=because)
     done.result()
 
 

@@ -7,8 +7,7 @@ import socket
 import struct
 from pathlib import Path
 
-from rig.errors import InputError
-from rig.reasons import make_error
+from rig.reasons import rig_error
 
 _SECRET = 0o077  # what the group and others may not have
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
@@ -33,7 +32,7 @@ def prepare_folder(folder: Path) -> None:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         check_folder(folder)
     except OSError as error:
-        raise make_error(InputError, "place_unusable", path=folder, text=error) from error
+        raise rig_error("place_unusable", path=folder, text=error) from error
 
 
 def require_sockets() -> None:
@@ -45,7 +44,7 @@ def require_sockets() -> None:
         Python has no Unix sockets here, as on Windows, so nobody knows who a client is.
     """
     if not hasattr(socket, "AF_UNIX"):
-        raise make_error(InputError, "no_unix_sockets")
+        raise rig_error("no_unix_sockets")
 
 
 def check_folder(folder: Path) -> None:
@@ -59,9 +58,9 @@ def check_folder(folder: Path) -> None:
     require_sockets()
     about = folder.stat()
     if about.st_uid != os.getuid():
-        raise make_error(InputError, "folder_foreign", folder=folder)
+        raise rig_error("folder_foreign", folder=folder)
     if about.st_mode & _SECRET:
-        raise make_error(InputError, "folder_open", folder=folder)
+        raise rig_error("folder_open", folder=folder)
 
 
 def peer_uid(connection: socket.socket) -> int | None:

@@ -23,7 +23,7 @@ from rig.daemon.rpc import error_to_data, in_words
 from rig.errors import DeviceError, InputError, RigError, SessionError
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import is_simulated
-from rig.reasons import Reason, make_error, make_reason, remedies
+from rig.reasons import Reason, make_error, make_reason, remedies, rig_error
 from rig.recorder.controller import Controller
 from rig.recorder.interrupts import StoppedError
 from rig.recorder.published import PublishedState, link_state
@@ -147,7 +147,7 @@ class Worker:
         if late_s < STALL_S or not watched:
             return None
         codes = ("disk_slow", "disk_slow_armed") if disk else ("held_up", "held_up_armed")
-        return make_error(SessionError, codes[bool(self.controller.armed)], late_s=late_s)
+        return rig_error(codes[bool(self.controller.armed)], late_s=late_s)
 
     def end(self) -> None:
         """Finish: what is armed is disarmed, what is being recorded is recorded to its end."""

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 
-from rig.errors import InputError
 from rig.protocol.measurable import check_gates
 from rig.protocol.protocol import SIDES, Protocol
 from rig.protocol.reader import parse
 from rig.protocol.yamltree import load, place_of
-from rig.reasons import make_error
+from rig.reasons import rig_error
 
 _VALUE = re.compile(r"\"[^\"]*\"|'[^']*'|[^,}\]\n#]*[^,}\]\n#\s]")
 _ROUNDED = 0.05e-3 + 1e-9  # heights are written to 0.1 mm
@@ -46,5 +45,5 @@ def rewrite_heights(protocol: Protocol) -> str:
         abs(gate.height - meant.height) > _ROUNDED
         for gate, meant in zip(written.gates, gates.gates, strict=True)
     ):
-        raise make_error(InputError, "heights_unwritten", protocol=protocol.source)
+        raise rig_error("heights_unwritten", protocol=protocol.source)
     return text

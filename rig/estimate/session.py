@@ -13,7 +13,6 @@ from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.summary import by_case, good_cases
 from rig.analysis.unknowns import SharedUnknowns
-from rig.errors import InputError
 from rig.estimate import coefficients as of
 from rig.estimate.alphas import SingleAlphas, single_alphas
 from rig.estimate.curves import DropCurves, drop_curves
@@ -22,7 +21,7 @@ from rig.estimate.hypotheses import AIR, CONTACT_U
 from rig.estimate.posterior import Posterior, posterior
 from rig.estimate.quadratic_forms import merge_like, quadratic_form
 from rig.estimate.rods import Impulses, impulses, resolution
-from rig.reasons import make_error, make_reason
+from rig.reasons import make_reason, rig_error
 from rig.sections import Sections
 from rig.threads import one_thread
 
@@ -171,7 +170,7 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
         Where no chain strikes anything, or no drop is good and fits a motion.
     """
     if protocol.surface is None:
-        raise make_error(InputError, "impacts_absent")
+        raise rig_error("impacts_absent")
     good = {
         (result.run.number, result.attempt): result.run
         for result in analysis.runs
@@ -179,7 +178,7 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
     }
     drops = {key: analysis.adjusted[key] for key in good if key in analysis.adjusted}
     if not drops:
-        raise make_error(InputError, "drops_unfitted" if good else "drops_unusable")
+        raise rig_error("drops_unfitted" if good else "drops_unusable")
     shared = (
         analysis.joint.shared if analysis.joint else SharedUnknowns(d.model for d in drops.values())
     )

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from contextlib import suppress
 from subprocess import DEVNULL, PIPE, STDOUT, Popen, TimeoutExpired
 
-from rig.errors import DeviceError, InputError
+from rig.errors import DeviceError
 from rig.flash.boards import Target
 from rig.flash.image import Image
 from rig.link.port import open_port
-from rig.reasons import make_error
+from rig.reasons import make_error, rig_error
 
 _LOOK_S = 0.2
 _CAUSES = {
@@ -51,7 +51,7 @@ def write_flash(
         The port cannot be used, or avrdude failed.
     """
     if "://" in port:
-        raise make_error(InputError, "not_flashable", port=port)
+        raise rig_error("not_flashable", port=port)
     # Avrdude tries for ever to open a port that is not there, and does not ask who uses it.
     open_port(port).close()
     avrdude = path or "avrdude"
@@ -64,7 +64,7 @@ def write_flash(
             command, text=True, errors="replace", stdin=DEVNULL, stdout=PIPE, stderr=STDOUT
         )
     except OSError as error:
-        raise make_error(InputError, "program_failed", path=avrdude, text=error) from error
+        raise rig_error("program_failed", path=avrdude, text=error) from error
     output = None
     while output is None:
         with suppress(TimeoutExpired):
@@ -73,7 +73,7 @@ def write_flash(
             child.kill()  # avrdude would try for ever to reach a board that is gone
     say(output.strip())
     if not os.path.lexists(port):
-        raise make_error(DeviceError, "flash_broke_off", port=port)
+        raise rig_error("flash_broke_off", port=port)
     if child.returncode:
         code = next(code for clue, code in _CAUSES.items() if clue in output.lower())
         raise make_error(DeviceError, code, port=port, exit_code=child.returncode)

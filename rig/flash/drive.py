@@ -10,12 +10,12 @@ from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig.errors import DeviceError, DeviceTimeoutError, InputError
+from rig.errors import DeviceError
 from rig.flash.boards import DRIVE
 from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.port import open_port, port_clock
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.usb.listing import serial_ports
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def copy_firmware(
         # The board may be gone before the computer has noticed that everything was written: who it
         # is afterwards decides.
         if _is_drive(drive):
-            raise make_error(DeviceError, "drive_failed", path=drive, text=error) from None
+            raise rig_error("drive_failed", path=drive, text=error) from None
 
     def restarted() -> list[str]:
         return [port] if port else [*pico_ports() - before]
@@ -105,7 +105,7 @@ def copy_firmware(
     _wait(_RESTART_S, lambda: any(os.access(path, os.R_OK | os.W_OK) for path in restarted()))
     for path in restarted():
         return path
-    raise make_error(DeviceTimeoutError, "no_pico_port")
+    raise rig_error("no_pico_port")
 
 
 def _ask_to_wait(port: str | None, say: Callable[[str], None]) -> None:
@@ -128,13 +128,13 @@ def _ask_to_wait(port: str | None, say: Callable[[str], None]) -> None:
 
 def _choose_drive(folder: str | None) -> Path:
     if folder is not None and not _is_drive(Path(folder)):
-        raise make_error(InputError, "not_a_pico", path=folder, file=_ABOUT)
+        raise rig_error("not_a_pico", path=folder, file=_ABOUT)
     drives = waiting_drives() if folder is None else [Path(folder)]
     if not drives:
-        raise make_error(DeviceError, "pico_unmounted" if sees_boot_pico() else "no_pico")
+        raise rig_error("pico_unmounted" if sees_boot_pico() else "no_pico")
     if len(drives) > 1:
         names = ", ".join(map(str, drives))
-        raise make_error(DeviceError, "many_picos", count=len(drives), names=names)
+        raise rig_error("many_picos", count=len(drives), names=names)
     return drives[0]
 
 

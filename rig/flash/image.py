@@ -15,7 +15,7 @@ from typing import NamedTuple
 from rig.errors import InputError, Problem
 from rig.files import read_input
 from rig.flash.boards import TARGETS, Target
-from rig.reasons import make_error
+from rig.reasons import rig_error
 
 _DATA, _END = 0, 1
 _BASES = {2: 4, 4: 16}
@@ -64,7 +64,7 @@ def read_image(file: str | Path | None, target: Target) -> Image:
     try:
         data = read_input(path)
     except OSError as error:
-        raise make_error(InputError, "image_unreadable", path=path, text=error) from None
+        raise rig_error("image_unreadable", path=path, text=error) from None
     flash = bytearray()
     for at, content in (_read_records if target.avrdude else _read_blocks)(data, path):
         if at + len(content) > target.flash_limit:
@@ -74,7 +74,7 @@ def read_image(file: str | Path | None, target: Target) -> Image:
     versions = set(_VERSION.findall(flash))
     boards = {each.board for each in TARGETS.values() if each.board.name.encode() + b"\0" in flash}
     if len(versions) != 1 or len(boards) != 1:
-        raise make_error(InputError, "image_foreign", path=path)
+        raise rig_error("image_foreign", path=path)
     if boards != {target.board}:
         raise InputError(f"{path} is for {boards.pop().one}, not for {target.board.one}")
     return Image(path, versions.pop().decode(), len(flash))

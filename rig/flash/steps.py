@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import closing
 
-from rig.errors import DeviceError, InputError
 from rig.flash.avrdude import write_flash
 from rig.flash.boards import TARGETS
 from rig.flash.drive import copy_firmware
@@ -13,7 +12,7 @@ from rig.flash.image import read_image
 from rig.link.client import Device
 from rig.link.messages import Identity
 from rig.link.port import open_port, port_clock
-from rig.reasons import make_error
+from rig.reasons import rig_error
 
 
 def flash(
@@ -51,7 +50,7 @@ def flash(
     if not target.avrdude:
         port = copy_firmware(port, way, file, say)
     elif port is None:
-        raise make_error(InputError, "flash_without_port")
+        raise rig_error("flash_without_port")
     else:
         write_flash(target, port, way, file, say)
     say("written; asking the board who it is")
@@ -59,5 +58,5 @@ def flash(
         identity = Device(opened, port_clock(opened)).connect()
     if (identity.board, identity.firmware) != (target.board.name, file.firmware):
         names = {"board": target.board.one, "answer": f"{identity.board}, {identity.firmware}"}
-        raise make_error(DeviceError, "flashed_other", port=port, firmware=file.firmware, **names)
+        raise rig_error("flashed_other", port=port, firmware=file.firmware, **names)
     return identity

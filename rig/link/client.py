@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from rig.boards import LONGEST_RECORD_MS
-from rig.errors import DeviceError, DeviceTimeoutError
+from rig.errors import DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.assembly import Assembly
 from rig.link.exchange import Exchange
@@ -14,7 +14,7 @@ from rig.link.frames import DELIMITER
 from rig.link.port import BAUDRATE
 from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Incoming
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.records import ClockSample, Drop
 
 BOOT_WAIT_S = 2.0
@@ -229,7 +229,7 @@ class Device(Exchange):
                 if (state.phase, state.label) != (wire.Phase.RECORDING, label):
                     break  # the certificate was lost on the way, or the drop is gone
                 if now_ns() >= hopeless:
-                    raise make_error(DeviceTimeoutError, "device_endless")
+                    raise rig_error("device_endless")
                 ask = now_ns() + round(_LATE_S * 1e9)
         return self.fetch(label)
 
@@ -282,5 +282,5 @@ class Device(Exchange):
                 size = max(_SMALLEST_READ, size // 2)
             else:
                 if first in drop.missing():
-                    raise make_error(DeviceError, "events_not_sent")
+                    raise rig_error("events_not_sent")
                 failures = 0

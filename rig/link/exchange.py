@@ -11,13 +11,12 @@ from typing import TypeVar
 import serial
 
 from rig.clock.host import Clock
-from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.port import Port
 from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Direction, Incoming, Record, Restart, Transcript
-from rig.reasons import make_error
+from rig.reasons import rig_error
 
 Answer = TypeVar("Answer", bound=wire.DeviceMessage)
 
@@ -43,7 +42,7 @@ def _line() -> Iterator[None]:
         # Of a serial port that is gone the cause is pyserial's own, and not the system's.
         is_gone = isinstance(error.__context__, serial.SerialException)
         text = "the port is gone" if is_gone else str(error)
-        raise make_error(DeviceError, "connection_lost", text=text) from error
+        raise rig_error("connection_lost", text=text) from error
 
 
 @dataclass(eq=False, repr=False)
@@ -142,8 +141,8 @@ class Exchange:
                 raise DeviceRefusedError(answer.reason, answer.detail, self.transcript.disarmed)
             if answer is not None:
                 names = {"request": type(message).__name__, "answer": type(answer).__name__}
-                raise make_error(DeviceError, "device_confused", **names)
-        raise make_error(DeviceTimeoutError, "device_silent", request=type(message).__name__)
+                raise rig_error("device_confused", **names)
+        raise rig_error("device_silent", request=type(message).__name__)
 
     def wait_for(self, seconds: float, wanted: Callable[[Incoming], bool]) -> wire.Message | None:
         """Read until a message comes that is waited for, or the time is over.
@@ -189,7 +188,7 @@ class Exchange:
                 "and no word of who is there" if self.transcript.rx.good else "that are no frames"
             )
             size_mb = self.rx_bytes / 1e6
-            raise make_error(DeviceError, "bytes_strange", size_mb=size_mb, lacking=lacking)
+            raise rig_error("bytes_strange", size_mb=size_mb, lacking=lacking)
         self._part += data
         # A line gives single bytes, and half a frame says nothing.
         ended = DELIMITER in data or len(self._part) > _NOISE
@@ -197,8 +196,8 @@ class Exchange:
         restarts = (record for record in records if isinstance(record, Restart))
         if not self.expect_boot and (restart := next(restarts, None)):
             if restart.label is None:
-                raise make_error(DeviceError, "board_restarted")
-            raise make_error(DeviceError, "board_restarted_in_drop", moment=restart.when)
+                raise rig_error("board_restarted")
+            raise rig_error("board_restarted_in_drop", moment=restart.when)
         return records
 
     def write(self, data: bytes) -> None:

@@ -12,9 +12,9 @@ import serial
 from serial.urlhandler import protocol_socket
 
 from rig.clock.host import Clock, SystemClock
-from rig.errors import DeviceError, InputError, RigError
+from rig.errors import DeviceError, RigError
 from rig.ports import check_name, simulation_package
-from rig.reasons import make_error
+from rig.reasons import make_error, rig_error
 
 BAUDRATE = 500_000
 """Exact from 16 MHz (UBRR 3 with U2X); 115200 would be 2.1 % off."""
@@ -82,15 +82,15 @@ def open_port(url: str) -> Port:
         if scheme in _NETWORK:
             # Pyserial keeps the cause only behind its own words.
             cause = error.__context__ if isinstance(error.__context__, OSError) else error
-            raise make_error(DeviceError, "port_unreachable", port=url, text=cause) from error
+            raise rig_error("port_unreachable", port=url, text=cause) from error
         below = error.__context__.args[:1] if error.__context__ else ()
         number = error.errno or next((code for code in below if isinstance(code, int)), 0)
         code, text = _CODES.get(number, "port_failed"), _PLAIN.get(number, str(error))
         raise make_error(DeviceError, code, port=url, text=text) from error
     except ValueError as error:
         if scheme == "emu":  # pyserial says no more of a handler it cannot import
-            raise make_error(DeviceError, "emulator_missing") from error
-        raise make_error(DeviceError, "port_failed", port=url, text=error) from error
+            raise rig_error("emulator_missing") from error
+        raise rig_error("port_failed", port=url, text=error) from error
 
 
 def check_url(url: str) -> None:
@@ -106,7 +106,7 @@ def check_url(url: str) -> None:
     try:
         serial.serial_for_url(url, do_not_open=True)
     except ValueError as error:
-        raise make_error(InputError, "not_a_port", port=url, text=error) from error
+        raise rig_error("not_a_port", port=url, text=error) from error
 
 
 def _add_handlers() -> None:

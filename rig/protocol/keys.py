@@ -8,12 +8,13 @@ key is a row of ``keys.txt``, and whatever uses it.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
-from pathlib import Path
 from typing import NamedTuple
 
-from rig.units import Dimension, Quantity, format_quantity
+from rig.text_rows import read_rows
+from rig.units import DIMENSIONS, Dimension, Quantity, format_quantity
 
 ANY = "*"
 """Placeholder in a path for names chosen by the file: those of chains."""
@@ -148,7 +149,7 @@ def _read_range(text: str) -> Range:
     assert parts is not None, text
     name, opening, low, high, unit, with_u, why = parts.groups()
     exact = "" if with_u else why or "no uncertainty is accepted here"
-    return Range(Dimension[name.upper()], float(low), float(high), unit, opening == "(", exact)
+    return Range(DIMENSIONS[name.upper()], float(low), float(high), unit, opening == "(", exact)
 
 
 def _read_accepted(text: str) -> Accepted:
@@ -167,23 +168,21 @@ def _read_accepted(text: str) -> Accepted:
     return _read_range(text)
 
 
-def read_key(row: str) -> Key:
+def read_key(cells: Iterable[str]) -> Key:
     """Return the key of a row of ``keys.txt``, whose columns are those of `Key`.
 
     Parameters
     ----------
-    row
-        Columns separated by ``|``, as the head of that file explains; the last two are optional.
+    cells
+        As the head of that file explains them; the last two are optional.
     """
-    name, form, default, *texts = map(str.strip, row.split("|"))
+    name, form, default, *texts = cells
     path, accepted = name.removesuffix("!"), _read_accepted(form)
     required, in_words = name.endswith("!"), default.startswith("(")
     return Key(path, accepted, default.strip("()"), required, in_words, *texts)
 
 
-_LINES = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
-_ROWS = (read_key(line) for line in _LINES if line and not line.startswith("#"))
-KEYS = {key.path: key for key in _ROWS}
+KEYS = {key.path: key for key in map(read_key, read_rows(__file__))}
 """Keys by path, in the order of a file."""
 
 SECTIONS: dict[str, dict[str, Key]] = {}

@@ -14,7 +14,7 @@ from rig.boards import BOARDS, LONGEST_RECORD_MS, Capabilities
 from rig.errors import InputError, Problem
 from rig.protocol.protocol import AT_REST, SIDES, Gate, Gates, Protocol
 from rig.protocol.yamltree import load, place_of
-from rig.reasons import make_error
+from rig.reasons import rig_error
 
 LEAST_RECORD_MS = 1500
 """Length of a recording that suits most labs, ms."""
@@ -73,7 +73,7 @@ def check_gates(protocol: Protocol) -> Gates:
         It has none, so nothing can be measured.
     """
     if protocol.gates is None or not protocol.gates.gates:
-        raise make_error(InputError, "no_gates", source=protocol.source)
+        raise rig_error("no_gates", source=protocol.source)
     return protocol.gates
 
 

@@ -10,7 +10,7 @@ from string import Template
 from typing import Any
 
 from rig.protocol import keys
-from rig.units import Dimension
+from rig.units import DIMENSIONS
 
 
 def page() -> str:
@@ -60,7 +60,7 @@ def _values(path: str, accepted: keys.Accepted) -> dict[str, Any]:
     match accepted:
         case keys.Range(dimension):
             # A text with a unit, or a plain number for a dimensionless quantity.
-            plain = dimension is Dimension.NUMBER
+            plain = dimension is DIMENSIONS["NUMBER"]
             return {"type": ["string", "number"] if plain else ["string"]}
         case keys.Whole(low, high):
             return {"type": "integer", "minimum": low, "maximum": high}

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rig.errors import DeviceError
+from rig.errors import RigError
 from rig.link.messages import Identity
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.usb.listing import path_of, serial_number_at, serial_ports
 
 SERIAL_NUMBER = "usb_serial_number"
@@ -97,5 +97,5 @@ class BoardLocator:
         return {} if self.serial_number is None else {SERIAL_NUMBER: self.serial_number}
 
 
-def _stranger(which: str, where: str) -> DeviceError:
-    return make_error(DeviceError, "other_board", port=where, difference=which)
+def _stranger(which: str, where: str) -> RigError:
+    return rig_error("other_board", port=where, difference=which)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from rig.errors import DeviceError, InputError, RigError, SessionError
+from rig.errors import InputError, RigError, SessionError
 from rig.link.messages import TEST_RUN, Identity, RefusalReason
 from rig.link.port import Port
 from rig.link.refusals import DeviceRefusedError
@@ -15,7 +15,7 @@ from rig.ports import fill_url, is_simulated
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_recordable
 from rig.protocol.protocol import Protocol
-from rig.reasons import Reason, error_of, make_error, make_reason, plain_reason
+from rig.reasons import Reason, error_of, make_error, make_reason, plain_reason, rig_error
 from rig.recorder import release_test
 from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
 from rig.recorder.interrupts import StoppedError
@@ -233,7 +233,7 @@ class Controller:
         if held is not None:
             if held not in self.session.fired_ns():
                 run, attempt = held
-                raise make_error(DeviceError, "drop_of_another_session", run=run, attempt=attempt)
+                raise rig_error("drop_of_another_session", run=run, attempt=attempt)
             recorder.collect(*held, fresh=False)
             self._lost.pop(held, None)
         for run, attempt in self._without_drop(RunState.ARMED, RunState.FIRED):
@@ -272,7 +272,7 @@ class Controller:
         last = self.session.latest_state(run)
         planned = self.published.get("session")["planned"]
         if not 1 <= run <= planned or attempt != (last.attempt if last else 0) + 1:
-            raise make_error(InputError, "not_next", run=run, attempt=attempt)
+            raise rig_error("not_next", run=run, attempt=attempt)
         self.session.require_presence()
         self._unarmed = None
         return recorder.arm(run, attempt, protocol)
@@ -298,7 +298,7 @@ class Controller:
         recorder = self._require_recorder()
         armed = recorder.armed
         if armed is None:
-            raise self._unarmed or make_error(InputError, "nothing_armed")
+            raise self._unarmed or rig_error("nothing_armed")
         try:
             recorder.fire(token)
         finally:
@@ -335,7 +335,7 @@ class Controller:
         self.finish()
         drop = self.session.drop(run, attempt)
         if drop is None:
-            missing = make_error(DeviceError, "not_recorded", run=run, attempt=attempt)
+            missing = rig_error("not_recorded", run=run, attempt=attempt)
             raise self._lost.get((run, attempt)) or missing
         return drop
 
@@ -370,8 +370,7 @@ class Controller:
             or last.attempt != attempt
             or self.session.drop(run, attempt) is None
         ):
-            which = {"run": run, "attempt": attempt, "state": state}
-            raise make_error(InputError, "cannot_judge", **which)
+            raise rig_error("cannot_judge", run=run, attempt=attempt, state=state)
         if (last.state, last.reasons) != (state, reasons):
             self._require_recorder().state(run, attempt, state, reasons)
             self.session.settle()
@@ -406,11 +405,11 @@ class Controller:
 
     def _require_recorder(self) -> Recorder:
         if self.recorder is None:
-            raise make_error(DeviceError, "no_connection")
+            raise rig_error("no_connection")
         return self.recorder
 
     def _require_rest(self, act: str) -> tuple[Recorder, Protocol]:
         recorder, protocol = self._require_recorder(), self._protocol
         if protocol is None or recorder.armed or self.due:
-            raise make_error(InputError, "not_now", act=act)
+            raise rig_error("not_now", act=act)
         return recorder, protocol

@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from rig.errors import SessionError
 from rig.ports import is_simulated, truth_file
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
-from rig.reasons import Reason, make_error, reasons_json
+from rig.reasons import Reason, reasons_json, rig_error
 from rig.session.reading import Reader, StateEntry
 from rig.session.store import Session
 
@@ -38,7 +37,7 @@ def open_for(protocol: Protocol, source: Path, url: str, path: Path) -> Session:
         code, values = "session_mixed", values | {"recorded": recorded, "port": url, "kind": kind}
     if code:
         session.close()
-        raise make_error(SessionError, code, **values)
+        raise rig_error(code, **values)
     return session
 
 

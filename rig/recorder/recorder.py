@@ -18,7 +18,7 @@ from rig.link.transcript import Direction, Record
 from rig.ports import told
 from rig.protocol.measurable import record_ms
 from rig.protocol.protocol import Protocol
-from rig.reasons import Reason, make_error, sentences
+from rig.reasons import Reason, make_error, rig_error, sentences
 from rig.recorder.feed import StateFeed
 from rig.recorder.interrupts import StoppedError
 from rig.recorder.published import PublishedState
@@ -270,7 +270,7 @@ class Recorder:
             log.info("run %d, attempt %d: recorded, %d edges", run, attempt, len(drop.edges))
             self._feed.show_drop(drop)
         elif (stored.certificate, stored.fire_tick) != (drop.certificate, drop.fire_tick):
-            raise make_error(DeviceError, "drop_differs", run=run, attempt=attempt)
+            raise rig_error("drop_differs", run=run, attempt=attempt)
         if drop.certificate is not None:
             self.device.acknowledge(label, drop.certificate.crc32)
             self.session.commit()

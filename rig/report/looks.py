@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from rig.text_rows import read_rows
 
-_ROWS = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
-COLORS = [row.split()[1:] for row in _ROWS if not row.startswith("#")]
+COLORS = [colors for _, *colors in read_rows(__file__, mark=None)]
 INK, MODEL, SECOND = 0, 1, 2
 PARTS = (1, 3, 4, 5, 6, 7)
 """Colours for the segments of stacked bars."""

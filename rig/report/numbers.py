@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from itertools import groupby
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from rig.measurands import Measurand
+from rig.measurands import Measurand
 
 MINUS = "−"
 _NEGATIVE = re.compile(r"(?<![\w.-])-(?=\d)")

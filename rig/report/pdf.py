@@ -8,19 +8,15 @@ from contextlib import redirect_stdout
 from html import escape
 from io import StringIO
 
-from rig.errors import InputError
 from rig.files import write_atomic
+from rig.reasons import rig_error
 from rig.report.canvas import figure_file
 
 try:
     with redirect_stdout(StringIO()):  # it prints links where a library is missing
         from weasyprint import HTML
 except OSError as error:
-    raise InputError(
-        "--pdf: WeasyPrint needs the library Pango, which is not installed",
-        "Debian: sudo apt-get install libpangoft2-1.0-0 libharfbuzz-subset0; "
-        "or print the page from a browser",
-    ) from error
+    raise rig_error("no_pango") from error
 
 from collections.abc import Sequence
 from pathlib import Path

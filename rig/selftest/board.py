@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
 from rig.boards import GATES
-from rig.errors import DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.exchange import Answer
@@ -16,7 +15,7 @@ from rig.link.frames import Frame, encode
 from rig.link.messages import TEST_RUN, DisarmReason, Phase, RefusalReason, pack_label, unpack_label
 from rig.link.port import Port, port_clock
 from rig.link.transcript import Record
-from rig.reasons import make_error
+from rig.reasons import make_error, rig_error
 from rig.records import Edge
 from rig.selftest.findings import NotPossibleError, fail_if, insist, need, wrong_answer
 
@@ -133,7 +132,7 @@ class BoardUnderTest(Device):
             if answer is not None:
                 need(answer != wire.Refused(RefusalReason.STOPPED, 0), "a closed emergency stop")
                 return answer
-        raise make_error(DeviceTimeoutError, "device_silent", request=str(request))
+        raise rig_error("device_silent", request=str(request))
 
     def receive(self) -> list[Record]:
         """Take what is there; a frame that is no message ends the check."""

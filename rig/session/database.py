@@ -9,9 +9,9 @@ from contextlib import ExitStack, closing
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from rig.errors import InputError, SessionError
+from rig.errors import InputError
 from rig.files import replacing, require_file
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.session.faults import translate_errors
 from rig.session.foreign import check_schema
 from rig.session.hashes import extend_chain
@@ -42,7 +42,7 @@ def build(path: Path, first: Record) -> None:
         The path exists, or cannot be written.
     """
     if path.exists():
-        raise make_error(SessionError, "session_there", path=path)
+        raise rig_error("session_there", path=path)
     with closing(sqlite3.connect(":memory:", isolation_level=None)) as memory:
         memory.executescript(f"BEGIN;\n{create_script()}COMMIT;")
         for table, rows in first.items():
@@ -54,7 +54,7 @@ def build(path: Path, first: Record) -> None:
             stream.write(content)
     except InputError as error:
         text = error.__cause__ or error
-        raise make_error(SessionError, "session_unmade", path=path, text=text) from error
+        raise rig_error("session_unmade", path=path, text=text) from error
 
 
 def check_place(path: Path) -> None:
@@ -69,9 +69,9 @@ def check_place(path: Path) -> None:
         require_file(path)
         size = path.stat().st_size
     except OSError as error:
-        raise make_error(SessionError, "session_absent", path=path, text=error) from error
+        raise rig_error("session_absent", path=path, text=error) from error
     if size == 0:  # SQLite would take it for an empty database
-        raise make_error(SessionError, "not_a_session", path=path, text="it is empty")
+        raise rig_error("not_a_session", path=path, text="it is empty")
 
 
 def connect(path: Path, *, readonly: bool) -> sqlite3.Connection:

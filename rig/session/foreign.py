@@ -12,8 +12,7 @@ from functools import cache
 from itertools import repeat
 from pathlib import Path
 
-from rig.errors import SessionError
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, Row, create_script
 
 LONGEST_VALUE = 1 << 26
@@ -53,12 +52,11 @@ def check_schema(path: Path, connection: sqlite3.Connection) -> int:
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if application != APPLICATION_ID:
         text = "it is another program's SQLite database"
-        raise make_error(SessionError, "not_a_session", path=path, text=text)
+        raise rig_error("not_a_session", path=path, text=text)
     if version < 1:
-        raise make_error(SessionError, "not_a_session", path=path, text="it was never finished")
+        raise rig_error("not_a_session", path=path, text="it was never finished")
     if version > SCHEMA_VERSION:
-        formats = {"format": version, "known": SCHEMA_VERSION}
-        raise make_error(SessionError, "session_newer", path=path, **formats)
+        raise rig_error("session_newer", path=path, format=version, known=SCHEMA_VERSION)
     shapes = _schema(connection)
     own = _schema_of(version)
     changed = [name for name in own if shapes.get(name) != own[name]]
@@ -66,7 +64,7 @@ def check_schema(path: Path, connection: sqlite3.Connection) -> int:
     strange = sorted(shapes.keys() - own.keys() - _OF_ANALYZE)
     altered += [f"it has {name}, which rig does not make" for name in strange]
     if altered:
-        raise make_error(SessionError, "session_altered", path=path, text=altered[0])
+        raise rig_error("session_altered", path=path, text=altered[0])
     return int(version)
 
 

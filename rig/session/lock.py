@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from rig.errors import SessionError
-from rig.reasons import make_error
+from rig.reasons import make_error, rig_error
 
 _POLL_S = 0.0025
 _LOOK_S = 0.01  # a check for a writer holds the lock for microseconds
@@ -42,14 +42,14 @@ class WriterLock:
             with suppress(FileNotFoundError):
                 # A hard link has its own lock and log: two writers would destroy the file.
                 if session.stat().st_nlink > 1:
-                    raise make_error(SessionError, "session_two_names", path=session)
+                    raise rig_error("session_two_names", path=session)
             session.parent.stat()  # filelock would create it
             self._lock.acquire()
             if has_fcntl:  # on other systems a locked file cannot be written
                 self.path.write_text(f"{os.getpid()}\n", "ascii")
         except Timeout:
             holder = _holder(self.path)
-            raise make_error(SessionError, "session_in_use", path=session, holder=holder) from None
+            raise rig_error("session_in_use", path=session, holder=holder) from None
         except SessionError:
             raise
         except OSError as error:

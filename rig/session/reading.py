@@ -14,8 +14,8 @@ from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, TypeVar
 
 from rig.boards import GATES
-from rig.errors import SessionError
-from rig.reasons import Reason, make_error
+from rig.errors import RigError
+from rig.reasons import Reason, rig_error
 from rig.records import ClockSample, Drop, HostBreak, Job, Pulse
 from rig.session.drop_check import ByteReplay, check_drop
 from rig.session.faults import translate_errors
@@ -114,7 +114,7 @@ class Reader:
     def connection(self) -> sqlite3.Connection:
         """The open SQLite connection."""
         if self._connection is None:
-            raise make_error(SessionError, "session_closed", path=self.path)
+            raise rig_error("session_closed", path=self.path)
         return self._connection
 
     def digest(self) -> str | None:
@@ -288,8 +288,8 @@ class Reader:
         # No other value of the row can be trusted.
         return Drop(row[1], row[2], tick_hz=1, edges=(), damage=why)
 
-    def _damage(self, text: str) -> SessionError:
-        return make_error(SessionError, "session_wrong", path=self.path, text=text)
+    def _damage(self, text: str) -> RigError:
+        return rig_error("session_wrong", path=self.path, text=text)
 
     def _edges(self, row: Row) -> list[Row]:
         number, events = row[0], named_values(row)["events"]

@@ -18,10 +18,10 @@ from types import MappingProxyType
 from typing import Self
 
 from rig import __version__
-from rig.errors import InputError, SessionError
+from rig.errors import InputError, RigError, SessionError
 from rig.files import make_folder, state_folder
 from rig.printable import encodable
-from rig.reasons import Reason, make_error
+from rig.reasons import Reason, rig_error
 from rig.records import ClockSample, Drop, HostBreak, Pulse
 from rig.session.database import build, check_place, connect
 from rig.session.faults import translate_errors
@@ -49,7 +49,7 @@ class Session(Reader):
         super().__init__(path, connection)
         self._journal = Journal(connection, path)
         self._presence = Presence(path)
-        self._loss: SessionError | None = None
+        self._loss: RigError | None = None
         self.rescued = False  # saved completely elsewhere, as the file was moved or deleted
         # Counted here, not by SQLite, so that a repeated commit writes the same rows.
         self._last_drop = max((row[0] for row in self._raw("drop", "")), default=0)
@@ -179,7 +179,7 @@ class Session(Reader):
             self.connection.execute("PRAGMA wal_checkpoint(PASSIVE)").fetchone()
         self.require_presence()
 
-    def _rescue(self, trouble: str) -> SessionError:
+    def _rescue(self, trouble: str) -> RigError:
         """Save all committed and pending records, and return the error that names the new file.
 
         Pending records also go into the open file, which is then complete wherever it was moved.
@@ -195,12 +195,12 @@ class Session(Reader):
                 place = _unused_name(make_folder(state_folder()) / self.path.name)
                 lost = self._journal.save(place)
         except (sqlite3.Error, OSError, InputError) as error:
-            return make_error(SessionError, "session_unsaved", trouble=trouble, text=error)
+            return rig_error("session_unsaved", trouble=trouble, text=error)
         self.rescued = True
         log.error("%s while it was in use; everything is saved as %s", trouble, place)
         except_for = f", but for {lost} records" if lost else ""
         values = {"trouble": trouble, "place": place, "except_for": except_for}
-        return make_error(SessionError, "session_rescued", **values)
+        return rig_error("session_rescued", **values)
 
     def close(self) -> None:
         """Commit and close; further calls do nothing.
@@ -299,7 +299,7 @@ class Session(Reader):
         if self._loss is not None:
             raise self._loss
         if self.readonly:
-            raise make_error(SessionError, "session_read_only", path=self.path)
+            raise rig_error("session_read_only", path=self.path)
         return self._journal
 
 

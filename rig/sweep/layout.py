@@ -12,7 +12,7 @@ import numpy as np
 
 from rig.errors import InputError
 from rig.protocol.fields import did_you_mean
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.sweep.variables import VARIABLES, scene_values
 from rig.units import UnitError, parse, quote
 
@@ -119,8 +119,7 @@ def lay_out(protocol: Protocol, vary: Iterable[str]) -> Layout:
     )
     if layout.size > MOST_POINTS:
         shape = " × ".join(map(str, layout.shape))
-        size = {"points": layout.size, "most": MOST_POINTS}
-        raise make_error(InputError, "sweep_too_large", shape=shape, **size)
+        raise rig_error("sweep_too_large", shape=shape, points=layout.size, most=MOST_POINTS)
     return layout
 
 
@@ -162,7 +161,7 @@ def read_vary(texts: Iterable[str], names: Sequence[str]) -> dict[str, tuple[flo
     if problems:
         raise InputError("\n".join(problems))
     if all(len(values) == 1 for values in varied_values.values()):
-        raise make_error(InputError, "nothing_varied")
+        raise rig_error("nothing_varied")
     return varied_values
 
 

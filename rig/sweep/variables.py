@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
-from pathlib import Path
 
-from rig.errors import InputError
 from rig.model.chain import XI
 from rig.model.impact import BETA, MU
 from rig.protocol.keys import Range, range_of
 from rig.protocol.protocol import Protocol
-from rig.reasons import make_error
+from rig.reasons import rig_error
+from rig.text_rows import read_rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,10 +31,8 @@ class Variable:
     label: str
 
 
-_ROWS = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
 VARIABLES = {
-    name: Variable(range_of(key), column, label)
-    for name, key, column, label in (re.split(r" +\| ", row) for row in _ROWS)
+    name: Variable(range_of(key), column, label) for name, key, column, label in read_rows(__file__)
 }
 """By name; ``variables.txt`` has the name, the key of a protocol that has its range, and these."""
 
@@ -54,9 +50,9 @@ def scene_values(protocol: Protocol) -> dict[str, tuple[float, ...]]:
         If nothing is struck in this scene, or it has air.
     """
     if protocol.surface is None:
-        raise make_error(InputError, "sweep_of_no_surface", protocol=protocol.source)
+        raise rig_error("sweep_of_no_surface", protocol=protocol.source)
     if protocol.drag is not None:
-        raise make_error(InputError, "sweep_in_air", protocol=protocol.source)
+        raise rig_error("sweep_in_air", protocol=protocol.source)
     chain = next(iter(protocol.chains.values())).chain
     stated: dict[str, tuple[float, ...]] = {}
     values: dict[str, float | None] = {}

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 import unicodedata
 from functools import cache, lru_cache
-from pathlib import Path
+
+from rig import text_rows
 
 POWERS = {"s": 0, "ms": 3, "us": 6, "ns": 9}
 """Decimal power from seconds, by the unit's name."""
@@ -17,9 +18,7 @@ LONGEST = 200
 @cache
 def read_rows(name: str, mark: str) -> list[list[str]]:
     """Return the rows of a table beside this module, their cells parted by a mark."""
-    text = Path(__file__).with_name(name).read_text("utf-8")
-    rows = [line for line in text.splitlines() if line and line[0] != "#"]
-    return [[cell.strip() for cell in row.split(mark)] for row in rows]
+    return text_rows.read_rows(__file__, name, mark)
 
 
 @cache

@@ -5,15 +5,15 @@ Keys are bound only here.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from itertools import groupby
 from operator import attrgetter
-from pathlib import Path
 from typing import NamedTuple
 
 from textual.content import Content
 
 from rig.campaign.machine import Stage
+from rig.text_rows import read_rows
 
 
 class Action(NamedTuple):
@@ -49,15 +49,14 @@ class Action(NamedTuple):
     driving: bool
 
 
-def _read_row(row: str) -> Action:
-    name, keys, label, text, command, stages, group = (cell.strip() for cell in row.split("|"))
+def _action(cells: Iterable[str]) -> Action:
+    name, keys, label, text, command, stages, group = cells
     possible = frozenset(Stage if stages == "any" else map(Stage, stages.split()))
     bare = name.removesuffix("*")
     return Action(bare, keys, label, text, command, possible, group, bare != name)
 
 
-_TABLE = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
-ACTIONS = tuple(_read_row(row) for row in _TABLE if not row.startswith("#"))
+ACTIONS = tuple(map(_action, read_rows(__file__)))
 BY_NAME = {action.name: action for action in ACTIONS}
 NEEDS_RIG = {"stop", "control", "wave"}
 """Actions that need a rig but no control."""

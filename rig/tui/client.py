@@ -17,7 +17,7 @@ from rig.daemon.client import AsyncClient
 from rig.daemon.replica import Replica
 from rig.daemon.socket_path import default_socket, prepare_folder
 from rig.errors import DeviceError, RigError
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.tui.state import DaemonState, read_state
 
 _AGAIN_S = 0.5
@@ -246,7 +246,7 @@ class ReconnectingClient:
         self._port = str(client.replica.state["port"]["url"])
         if self.url and self._port != self.url:
             self.in_the_way = self._port, int(client.replica.state["daemon"]["pid"])
-            raise make_error(DeviceError, "daemon_port", port=self._port, wanted=self.url)
+            raise rig_error("daemon_port", port=self._port, wanted=self.url)
 
     def _start(self, error: DeviceError) -> None:
         """Start a daemon that outlives this screen until it is idle."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rig.boards import MEGA, PICO, UNO
 from rig.errors import DeviceError
-from rig.reasons import make_error
+from rig.reasons import make_error, rig_error
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -138,7 +138,7 @@ def path_of(serial_number: str, ports: Iterable[SerialPort]) -> str | None:
     paths = [port.path for port in ports if port.serial_number == serial_number]
     if len(paths) > 1:
         places = " and ".join(paths)
-        raise make_error(DeviceError, "many_serial_numbers", ports=places, number=serial_number)
+        raise rig_error("many_serial_numbers", ports=places, number=serial_number)
     return paths[0] if paths else None
 
 

@@ -174,8 +174,8 @@ def test_one_chain_is_compared_by_its_speed_a_fence_by_gravity():
 
 
 def test_a_guessed_size_counts_with_8_degrees_and_another_as_known_exactly():
-    budget = {"start height": 3.0, "datum": 4.0}
-    assert effective_degrees(5.0, budget, {}) == pytest.approx(5.0**4 / (3.0**4 / 8.0))
+    degrees = effective_degrees(5.0, {"start height": 3.0, "datum": 4.0}, {})
+    assert degrees == pytest.approx(5.0**4 / (3.0**4 / 8.0))
     assert effective_degrees(4.0, {"datum": 4.0}, {}) == math.inf
 
 

@@ -75,7 +75,7 @@ def test_examples_are_commands(line):
     for part in line.split(" && "):
         program, *words = shlex.split(part)
         assert program == "rig"
-        assert _parser().parse(words).module
+        assert _parser().parse(words).place
 
 
 @cases

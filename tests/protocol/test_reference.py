@@ -82,7 +82,7 @@ def test_a_default_written_is_as_left_out(key):
 
 def test_a_row_of_the_table_is_all_that_a_key_needs(monkeypatch):
     """The reader, its hints, the page and the schema follow."""
-    delay = keys.read_key("release.delay | time [0, 3600] s | 2 s | of the pulse | 5 s")
+    delay = keys.read_key(("release.delay", "time [0, 3600] s", "2 s", "of the pulse", "5 s"))
     monkeypatch.setattr(keys, "KEYS", KEYS | {delay.path: delay})
     monkeypatch.setitem(keys.SECTIONS["release"], "delay", delay)
     monkeypatch.setitem(fields.DEFAULTS, delay.path, 2.0)

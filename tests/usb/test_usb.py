@@ -195,7 +195,7 @@ def test_it_starts_a_command_that_there_is(unit):
     words = settings["Service"]["ExecStart"].split()
     rig = words.index("rig")
     arguments = [word.replace("%i", "left") for word in words[rig + 1 :] if word != "$RIG_OPTIONS"]
-    assert _parser().parse_args(arguments).module == "daemon"
+    assert _parser().parse_args(arguments).place == "daemon.main"
 
 
 @pytest.mark.skipif(not IS_HERE, reason="needs systemd-analyze")
