@@ -54,10 +54,6 @@ def moment(text: str, power: int = 0) -> int | None:
 
 def picoseconds(text: str, power: int = 0) -> int | None:
     """Read a decimal number of 10^power s as picoseconds, ties to even; `None` for another text."""
-    whole, _, part = text.partition(".")
-    digits, zeros = whole + part, 12 + power - len(part)
-    if zeros >= 0 and len(digits) + zeros < 33 and digits.isdecimal() and digits.isascii():
-        return int(digits + "0" * zeros)  # as most times are: a Decimal costs ten times as much
     if not is_number(text):
         return None
     number = _EXACT.scaleb(_EXACT.create_decimal(text), 12 + power)
