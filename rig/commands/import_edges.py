@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Sequence
 from functools import partial
-from operator import attrgetter
 from pathlib import Path
 
 from rig.analysis.chain_records import chain_records
@@ -28,6 +27,7 @@ from rig.report.templates import lines
 from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.timers.importing import FallMatch, Import, import_drops
+from rig.timers.layouts import FileReading
 from rig.timers.moments import TICK_HZ
 from rig.timers.problems import refusal
 
@@ -79,32 +79,33 @@ def import_with_protocol(protocol: Protocol, arguments: Arguments) -> Import:
     return import_drops(channels, bars, arguments, partial(fit_falls, protocol))
 
 
-def fit_falls(protocol: Protocol, drops: Sequence[Drop], exact: bool) -> FallMatch:
+def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatch:
     """Compare the first drops with falls that the protocol has."""
     planned = {run.number: run for run in runs(protocol)}
     # Of gates that the file does not have nothing is due.
-    protocol = with_gates(protocol, {edge.channel for drop in drops for edge in drop.edges})
-    shares, near, expected = [(1.0, drops[0].run)], 0, 0
-    evidence, gravity = 0.0, list[float]()
-    results: list[DropResult] = []
+    protocol = with_gates(protocol, {*reading.channel.tolist()})
+    near, expected, evidence, gravity = 0, 0, 0.0, list[float]()
+    shares, results = [(1.0, 0)], list[DropResult]()
     rate = TimeScale(TICK_HZ, RESONATOR_TOLERANCE)
-    compared = [drop for drop in drops if drop.run in planned][: None if exact else _COMPARED]
-    order = sorted(compared, key=lambda x: (len(x.edges), x.edges[-1].tick - x.edges[0].tick))
-    chosen = order[: -1 : 1 + len(order) // _MOST] + order[-1:]
-    for drop in sorted(chosen, key=attrgetter("run")):
-        run = planned[drop.run]
+    compared = [n for n, run in enumerate(reading.runs) if run in planned]
+    compared = compared[: None if exact else _COMPARED]
+    places, lasting = reading.places, reading.lasting
+    order = sorted(compared, key=lambda n: (places[n + 1] - places[n], lasting[n]))
+    for n in sorted({*order[:: 1 + len(order) // _MOST], *order[-1:]}):
+        run, drop = planned[reading.runs[n]], reading.drop(n)
         records = chain_records(protocol, run, drop, TICK_HZ)
         votes = sum(most_votes(protocol, record, rate.u, priors(protocol)) for record in records)
         due = sum(record.edge_count for record in records)
-        shares.append((votes / max(1, len(drop.edges), due), drop.run))
+        # A single edge is near one of some fall, whenever that began.
+        shares.append((votes / max(2, len(drop.edges), due), n))
         near, expected = near + votes, expected + due
         if exact and len(results) < _COMPARED:
             result, fit = DropCase(protocol, run, drop, rate).read(explain=False)
             evidence += log_evidence(fit) if fit else 0.0
             gravity += [each.value for name, each in result.quantities.items() if "gravity" in name]
             results.append(result)
-    counts = {"compared": len(chosen), "runs": len(compared)}
-    text = make_reason("falls_fit", **counts, near=near, due=expected).text
+    sums = {"compared": len(shares) - 1, "runs": len(compared), "near": near, "due": expected}
+    text = make_reason("falls_fit", **sums).text
     if gravity:
         text += f"; g {sum(gravity) / len(gravity):.2f} m/s²"
     check = check_gravity(protocol, results)

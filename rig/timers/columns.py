@@ -7,6 +7,7 @@ Facts are collected of each column (of its heading, its unit, its values), and t
 from __future__ import annotations
 
 import itertools
+import string
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -19,16 +20,16 @@ from rig.timers import vocabulary
 from rig.timers.vocabulary import POWERS, SYMBOLS, find_label, form, is_number, normal, words
 
 if TYPE_CHECKING:
-    from rig.timers.events import TimerFile
     from rig.timers.table import Row, RowBlock
+    from rig.timers.timer_file import TimerFile
 
 SAMPLED = ("level", "volts")
 """Roles of samples: what an input was at a time, whether it changed then or not."""
 VALUES = (SAMPLED, ("state", "cleared"), ("edge",))
 """Roles that say what happened; of a table that has several, the first are read."""
 _MOST_COLUMNS = 200
-_BESIDE = 0.1
-"""Share of the rows below which a column has settings that stand beside samples."""
+_NOWHERE = sys.maxsize
+"""Of a column that there is not."""
 _FEWEST_TIMES = 4
 """Columns of numbers without a heading that are times side by side, as programs print lists."""
 
@@ -125,13 +126,7 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
         limits = {"columns": width, "limit": _MOST_COLUMNS}
         file.problems.refuse(rows[0].line, 1, "too_many_columns", **limits)
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
-    heading = block.find_heading({n for n, texts in cells.items() if texts}, width)
-    if heading is None:  # settings may stand beside samples
-        beside = {n for n, texts in cells.items() if len(texts) < _BESIDE * len(rows)}
-        block.headings += [
-            row._replace(texts=[t * (n in beside) for n, t in enumerate(row.texts)]) for row in rows
-        ]
-        cells |= {n: [] for n in beside}
+    heading = block.find_heading(width)
     facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
     filled = [len(cells[n]) for n, fact in facts.items() if "levels" in fact]
     table = {
@@ -153,10 +148,9 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
             if row.known > 1 and len(row.texts) > width:
                 file.problems.refuse(row.line, 1, "heading_unfit", columns=width)
         inputs = [column for column in columns if column.role in SAMPLED]
-        count = [f"D{n}" for n, column in enumerate(inputs) if column.role == "level"]
-        names = block.find_inputs(len(inputs))
-        file.is_counted |= not names
-        for column, name in zip(inputs, names or count, strict=False):
+        # By letters, for a number may be taken for that of a gate.
+        names = block.find_inputs(len(inputs)) or string.ascii_uppercase
+        for column, name in zip(inputs, names, strict=False):
             column.gate = column.name = name
     _settle_roles(file, columns)
     above = heading or rows[0]
@@ -269,15 +263,11 @@ def pair_columns(columns: Sequence[TimerColumn]) -> list[ColumnPair]:
     counts = [column for column in columns if column.role == "index"][:1] or [ROW_COUNT]
     times = [column for column in columns if column.role == "time"] or counts
     chosen = next((v for v in VALUES if any(c.role in v for c in columns)), ())
-    is_sampled = chosen == SAMPLED
-    pairs = []
+    is_sampled, pairs = chosen == SAMPLED, list[ColumnPair]()
     for clock in times:
         own = [column for column in columns if _clock_of(column, times) is clock]
-        own_first = [] if is_sampled else [*own, *columns]
-        names = [
-            next((column.at for column in own_first if column.role == role), sys.maxsize)
-            for role in ("run", "gate")
-        ]
+        places = {} if is_sampled else {c.role: c.at for c in [*columns[::-1], *own[::-1]]}
+        names = places.get("run", _NOWHERE), places.get("gate", _NOWHERE)
         values = [column for column in own if column.role in chosen]
         labels = Counter(map(_label_of, values))
         for n, value in enumerate(values, 1):
@@ -286,16 +276,20 @@ def pair_columns(columns: Sequence[TimerColumn]) -> list[ColumnPair]:
             label += f" ({n})" if is_sampled and labels[label] > 1 else ""
             pairs.append(ColumnPair(clock, value, clock.run or value.run, label, *names))
         if not values and not is_sampled:
-            moment = replace(clock, at=sys.maxsize, role="moment")
+            moment = replace(clock, at=_NOWHERE, role="moment")
             pairs.append(ColumnPair(clock, moment, clock.run, clock.gate, *names))
     return pairs
 
 
 def _clock_of(value: TimerColumn, times: Sequence[TimerColumn]) -> TimerColumn:
     """Return the times of a value: of its run and gate, else those nearest to its left."""
-    beside = [clock for clock in times if clock.run in {value.run, ""} or not value.run] or times
-    own = [clock for clock in beside if clock.gate and clock.gate == value.gate] or beside
-    return min(own, key=lambda clock: (clock.at > value.at, abs(clock.at - value.at)))
+
+    def strangeness(clock: TimerColumn) -> tuple[bool, bool, bool, int]:
+        is_other_run = bool(value.run) and clock.run not in {value.run, ""}
+        is_other_gate = not clock.gate or clock.gate != value.gate
+        return is_other_run, is_other_gate, clock.at > value.at, abs(clock.at - value.at)
+
+    return min(times, key=strangeness)
 
 
 def _label_of(value: TimerColumn) -> str:

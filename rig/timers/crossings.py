@@ -6,12 +6,9 @@ straight line between two samples crosses that middle.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from rig.arrays import Array
+from rig.arrays import Array
 
 _HYSTERESIS = 0.2
 """Share of the swing between dark and bright, half of it on either side of the middle."""

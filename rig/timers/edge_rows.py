@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from rig.records import Drop, Edge
+from rig.timers.lines import read_lines
 from rig.timers.moments import TICK_HZ, moment, seconds
+from rig.timers.problems import ProblemList
 from rig.timers.table import Row, split_cells
 from rig.timers.vocabulary import LONGEST, is_remark
-
-if TYPE_CHECKING:
-    from rig.timers.problems import ProblemList
 
 HEADER = ("run", "channel", "time_s", "state")
 """Of the project's own format, in which every line is a row."""
@@ -35,14 +35,21 @@ def is_own(head: Iterable[str]) -> bool:
     return [text.strip() for text in first.split(",")[:2]] == list(HEADER[:2])
 
 
-def read_edges(lines: Iterator[tuple[int, str]], problems: ProblemList) -> list[Drop]:
-    """Read drops in the import format, and note faults at their places."""
+def read_edges(path: str | Path) -> list[Drop]:
+    """Read drops in the import format.
+
+    Raises
+    ------
+    InputError
+        Every fault at its place.
+    """
+    problems, header = ProblemList(str(path)), ",".join(HEADER)
     rows = (
         Row(number, split_cells(line, ","), line)
-        for number, line in lines
+        for number, line in enumerate(read_lines(path), 1)
         if line.strip() and not is_remark(line)
     )
-    heading, header = next(rows, Row(1, [])), ",".join(HEADER)
+    heading = next(rows, Row(1, []))
     if ",".join(heading.texts).lower() != header:
         problems.refuse(heading.line, 1, "wrong_header", header=header)
     runs: dict[int, list[Edge]] = {}
@@ -51,32 +58,29 @@ def read_edges(lines: Iterator[tuple[int, str]], problems: ProblemList) -> list[
         if len(row.texts) != len(HEADER):
             values = {"values": len(row.texts), "needed": len(HEADER), "header": header}
             problems.add(row.line, 1, "", "wrong_width", **values)
-        elif None not in (cells := _read_cells(row, problems)):
-            run, channel, tick, state = cells
-            edges = runs.setdefault(run, [])
-            first = edges[0].tick if edges else tick
-            bounds = last.get((run, channel), first - _LONGEST_RUN), first + _LONGEST_RUN
-            if bounds[0] <= tick <= bounds[1]:
-                last[run, channel] = tick
-                edges.append(Edge(tick, channel, bool(state)))
-            else:
-                begin, end = (seconds(bound, Fraction(TICK_HZ)) for bound in bounds)
-                accepted = f"a time from {begin} s (the last of channel {channel}) to {end} s"
-                problems.reject(*row.place(2), HEADER[2], row.texts[2], accepted)
+            continue
+        cells = list[Any]()
+        for n, (text, (pattern, read, accepted)) in enumerate(zip(row.texts, _CELLS, strict=True)):
+            cells.append(read(text) if re.fullmatch(pattern, text) else None)
+            if cells[-1] is None:
+                problems.reject(*row.place(n), HEADER[n], text, accepted)
+        if None in cells:
+            continue
+        run, channel, tick, state = cells
+        edges = runs.setdefault(run, [])
+        first = edges[0].tick if edges else tick
+        begin, end = last.get((run, channel), first - _LONGEST_RUN), first + _LONGEST_RUN
+        if not begin <= tick <= end:
+            since, until = (seconds(bound, Fraction(TICK_HZ)) for bound in (begin, end))
+            accepted = f"a time from {since} s (the last of channel {channel}) to {until} s"
+            problems.reject(*row.place(2), HEADER[2], row.texts[2], accepted)
+            continue
+        last[run, channel] = tick
+        edges.append(Edge(tick, channel, bool(state)))
     problems.raise_if_any()
-    if not runs:
+    if not any(runs.values()):
         problems.refuse(1, 1, "no_edges")
     return [make_drop(run, runs[run]) for run in sorted(runs)]
-
-
-def _read_cells(row: Row, problems: ProblemList) -> list[Any]:
-    """Return the values of a row, `None` for each that is not accepted."""
-    cells = []
-    for n, (text, (pattern, read, accepted)) in enumerate(zip(row.texts, _CELLS, strict=True)):
-        cells.append(read(text) if re.fullmatch(pattern, text) else None)
-        if cells[-1] is None:
-            problems.reject(*row.place(n), HEADER[n], text, accepted)
-    return cells
 
 
 def make_drop(run: int, edges: list[Edge]) -> Drop:

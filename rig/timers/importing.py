@@ -8,38 +8,33 @@ from __future__ import annotations
 
 import itertools
 import math
+from argparse import Namespace
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import closing
-from dataclasses import replace
 from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from rig.errors import InputError
 from rig.reasons import Reason, make_reason
 from rig.records import Drop
 from rig.timers.edge_rows import HEADER, is_own, read_edges
-from rig.timers.events import TimerFile
-from rig.timers.layouts import SETTINGS, FileReading, find_layouts, input_names, read_drops
+from rig.timers.layouts import SETTINGS, FileReading, find_layouts, input_names
 from rig.timers.lines import read_lines
-from rig.timers.problems import ProblemList, refusal
-from rig.timers.timer_file import read_file
+from rig.timers.moments import LONGEST_S, TICK_HZ
+from rig.timers.problems import refusal
+from rig.timers.timer_file import TimerFile, read_file
 from rig.timers.vocabulary import POWERS, form
 
-if TYPE_CHECKING:
-    from argparse import Namespace
-
-Fit = Callable[[Sequence[Drop], bool], "FallMatch"]
+Fit = Callable[[FileReading, bool], "FallMatch"]
 
 _GOOD = 0.75
 """Share of the edges near a fall's, of all that came or were due, that makes a reading credible."""
 _DECISIVE = 7.0
 """Logarithm of the odds beyond which a reading is taken without a question: 1,000 to 1."""
 _FINALISTS = 6
-_MOST_RUNS = 10_000
-"""Runs that are read in all ways together before the finalists are read in full:
-ten of each of a thousand ways, of which three are compared with falls."""
+_LONGEST = LONGEST_S * TICK_HZ
+"""Picoseconds that a drop may last."""
 _COARSE = 10**8
 """Picoseconds: times in whole tenths of milliseconds may be those of two falls by chance."""
 _FEWEST_SAME = 3
@@ -58,8 +53,8 @@ class FallMatch(NamedTuple):
     ----------
     share
         Edges near a fall's, of all that came or were due, from 0 to 1, in the worst run.
-    run
-        That run.
+    worst
+        Which of the runs that is, from 0.
     evidence
         Logarithm of the marginal likelihood; 0 if not asked for.
     text
@@ -69,7 +64,7 @@ class FallMatch(NamedTuple):
     """
 
     share: float
-    run: int = 0
+    worst: int = 0
     evidence: float = 0.0
     text: str = ""
     doubts: Sequence[Reason] = ()
@@ -121,17 +116,15 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
         for name in "map", "map_file", "channel", "dark", "unit":
             if getattr(options, name) is not None:
                 raise refusal(f"--{name.replace('_', '-')}", "own_format_stated")
-        with closing(read_lines(place)) as rows:
-            drops = read_edges(enumerate(rows, 1), ProblemList(place))
-        return Import(drops, {}, [f"the project's own format: {','.join(HEADER)}"], [])
+        return Import(read_edges(place), {}, [f"the project's own format: {','.join(HEADER)}"], [])
     readings, stated = _find_readings(options, gates, bars)
-    reading, match = read_drops(readings[0].file, readings[0].layout), FallMatch(0.0)
+    reading, match = readings[0], FallMatch(0.0)
     if not options.as_read:
         readings = [reading for reading in readings if reading.is_whole] or readings
         reading, match = _choose(readings, place, fit, stated)
         _refuse_excess(reading, bars, place, is_stated="groups" in stated)
     notes = [*reading.file.notes, _account(reading, options)]
-    if len(readings) > 1 or (match.share < _GOOD and not options.as_read):
+    if not options.as_read:
         notes.append(make_reason("reading_chosen", option=str(reading.layout), fit=match.text))
     notes += [*match.doubts, *_assumptions(reading, gates)]
     if options.map_file is not None and not Path(options.map_file).exists():
@@ -145,7 +138,7 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
 def _find_readings(
     options: Namespace, gates: Sequence[int], bars: int
 ) -> tuple[list[FileReading], dict[str, Any]]:
-    """Return every reading of a file that has drops, of its first ones, and what options decide."""
+    """Return every reading of a file that has drops, and what options decide."""
     readings, faults, stated = list[FileReading](), list[InputError](), dict[str, Any]()
     way, ways = 0, 1
     while way < ways:
@@ -153,9 +146,8 @@ def _find_readings(
         try:
             read_file(file)
             stated = _read_stated(options, file, gates)
-            layouts = list(find_layouts(file, gates, bars, stated))
-            most = _MOST_RUNS // (len(layouts) or 1)
-            readings += [x for y in layouts if (x := read_drops(file, y, most)).drops]
+            possible = [FileReading(file, x) for x in find_layouts(file, gates, bars, stated)]
+            readings += [x for x in possible if x.runs and max(x.lasting) <= _LONGEST]
         except InputError as error:
             faults.append(error)
         way, ways = way + 1, file.ways
@@ -177,32 +169,29 @@ def _choose(
     whatever falls say. The contrary of what the file says of beams may be proposed, and is never
     taken.
     """
-    distinct = [*{tuple(x.drops): x for x in reversed(readings)}.values()][::-1]
-    is_said = distinct[0].layout.dark == "states" and "dark" not in stated
-    if len(distinct) == 1 and "channels" in stated and not is_said:
-        reading = read_drops(distinct[0].file, distinct[0].layout)
-        return reading, fit(reading.drops, True)
-    rough = [(fit(x.drops, False), x) for x in distinct]
-    rough.sort(key=lambda row: -row[0].share)
+    distinct = [*{x.key: x for x in reversed(readings)}.values()][::-1]
+    if len(distinct) == 1 and "channels" in stated:
+        return distinct[0], fit(distinct[0], True)
+    rough = sorted(((fit(x, False), x) for x in distinct), key=lambda row: -row[0].share)
     likely = [x for match, x in rough if match.share >= _GOOD]
-    finalists = (read_drops(x.file, x.layout) for x in likely[:_FINALISTS])
-    exact = [(fit(x.drops, True), x) for x in finalists if x.drops]
+    exact = [(fit(x, True), x) for x in likely[:_FINALISTS]]
+    # The first row of a log of changes is the state at the beginning, unless falls say that.
+    prior = {"state": 0.0, "change": -_DECISIVE}
     ranked = [row for row in exact if row[0].share >= _GOOD]
-    ranked.sort(key=lambda row: -row[0].evidence)
-    usual_first = [row for row in ranked if row[1].layout.first == "state"]
-    if usual_first and ranked[0][0].evidence - usual_first[0][0].evidence < _DECISIVE:
-        ranked = usual_first
+    ranked = [row for row in ranked if row[1].layout.dark != "inverted" or "dark" in stated]
+    ranked.sort(key=lambda row: -row[0].evidence - prior[row[1].layout.first])
     if not ranked:
         match, best = (exact or rough)[0]
-        contrary = read_drops(best.file, replace(best.layout, dark="inverted"))
-        likely += [x for _, x in rough if x not in likely and x.layout.dark != "states"]
-        likely += [contrary] if fit(contrary.drops, False).share >= _GOOD else []
-        options = "; ".join([*(str(x.layout) for x in likely[:3]), "--as-read"])
-        values = {"share": 100 * match.share, "run": match.run, "options": options}
-        raise refusal(f"{place}:{min(best.lines[match.run])}:1", "no_reading_fits", **values)
+        is_open = [x for _, x in rough if x.layout.dark not in {"states", "inverted"}]
+        proposed = list(dict.fromkeys(str(x.layout) for x in [*likely, *is_open]))[:3]
+        options = "; ".join([*proposed, "--as-read"])
+        values = {"share": 100 * match.share, "run": best.runs[match.worst], "options": options}
+        line = best.line[slice(*best.places[match.worst :][:2])].min()
+        raise refusal(f"{place}:{line}:1", "no_reading_fits", **values)
     (match, reading), *rest = ranked
-    if rest and match.evidence - rest[0][0].evidence < _DECISIVE:
-        options = " or ".join(str(reading.layout) for _, reading in ranked[:2])
+    rivals = [row for row in rest if row[1].layout.first == reading.layout.first]
+    if rivals and match.evidence - rivals[0][0].evidence < _DECISIVE:
+        options = f"{reading.layout} or {rivals[0][1].layout}"
         raise refusal(place, "several_readings", options=options)
     return reading, match
 
@@ -212,12 +201,12 @@ def _refuse_excess(reading: FileReading, bars: int, place: str, *, is_stated: bo
 
     An input that has a name is no wire of all gates, unless the user stated so.
     """
-    file, layout = reading.file, reading.layout
+    file, layout, drops = reading.file, reading.layout, reading.drops
     is_wire = layout.groups == "passing" and not file.is_wide and bool(file.labels)
     if is_wire and not is_stated:
         raise refusal(place, "one_wire", option=str(layout))
     earlier: dict[object, int] = {}
-    for drop in reading.drops:
+    for drop in drops:
         # Of coarse times those of a whole drop are a copy's; of fine ones, rows may be missing.
         is_coarse = all(edge.tick % _COARSE == 0 for edge in drop.edges)
         moments: set[object] = {drop.edges} if is_coarse else {*drop.edges}
@@ -231,7 +220,7 @@ def _refuse_excess(reading: FileReading, bars: int, place: str, *, is_stated: bo
             excess = {"run": drop.run, "channel": channel, "count": count, "most": 2 * bars}
             raise refusal(place, "more_edges", **excess)
     # Of changes alone, two in a row mean that the row of the first is missing.
-    changes = Counter((event.line, event.tick) for event in file.events)
+    changes = Counter(zip(reading.line.tolist(), reading.tick, strict=True))
     lines = [line for (line, _), count in changes.items() if count > 1]
     if lines and file.period is None:  # regular samples see changes together
         raise refusal(place, "at_once", lines=_some(lines))
@@ -239,12 +228,12 @@ def _refuse_excess(reading: FileReading, bars: int, place: str, *, is_stated: bo
 
 def _account(reading: FileReading, options: Namespace) -> Reason:
     """Say what became of every row; refuse rows that are not used."""
-    file, used = reading.file, set().union(*reading.lines.values())
+    file, used = reading.file, {*reading.line.tolist()}
     # A level that changes may be of an input that is no gate.
-    left = set() if file.is_sampled else {event.line for event in file.events} - used
+    changed = file.changes["line"][~file.changes["first"]]
+    left = set() if file.is_sampled else {*changed.tolist()} - used
     unused = sorted({*file.unread, *left})
-    edges = sum(len(drop.edges) for drop in reading.drops)
-    counts = {"runs": len(reading.drops), "rows": file.rows, "edges": edges}
+    counts = {"runs": len(reading.runs), "rows": file.rows, "edges": len(reading.line)}
     if not unused:
         return make_reason("rows_used", silent=file.rows - len(used), **counts)
     rest = {"unused": len(unused), "lines": _some(unused)}
@@ -261,7 +250,7 @@ def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]
     """Yield what is taken to be so, and what the file lacks."""
     file, layout, channels = reading.file, reading.layout, reading.layout.channels
     if layout.pause_s:
-        yield make_reason("several_drops", drops=len(reading.drops), pause_s=layout.pause_s)
+        yield make_reason("several_drops", drops=len(reading.runs), pause_s=layout.pause_s)
     if file.period:
         period_us = file.period / 10 ** POWERS[layout.unit or "s"] / 1e6
         yield make_reason("samples", period_us=period_us, u_us=period_us / math.sqrt(12.0))
@@ -269,9 +258,9 @@ def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]
         yield make_reason("gates_absent", channels=", ".join(absent))
     if opposite := {"high": "low", "low": "high"}.get(layout.dark):
         yield make_reason("blocked_level", level=layout.dark, other=opposite)
-    if file.first:
+    if reading.firsts:
         code = "first_row" if layout.first == "change" else "first_unknown"
-        yield make_reason(code, input=file.first.label)
+        yield make_reason(code, input=", ".join(reading.firsts))
     idle = [label for label in file.labels if label not in channels]
     if idle and layout.groups != "passing":
         yield make_reason("inputs_unused", inputs=", ".join(idle))
@@ -282,30 +271,27 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
 
     Each is what a dry run prints: settings, and the gate's channel of each input.
     """
-    saved, texts = Path(options.map_file or ""), dict[str, str]()
-    if saved.is_file():
-        texts[options.map_file] = next(read_lines(saved), "")
-    named = {f"--{name}": (name, getattr(options, name)) for name in ("dark", "unit")}
-    if len(file.labels) < 2:
-        named["--channel"] = next(iter(file.labels), "input"), options.channel
+    saved, labels, stated = Path(options.map_file or ""), file.labels or [""], dict[str, Any]()
+    texts = {options.map_file: next(read_lines(saved), "")} if saved.is_file() else {}
+    named = {"--dark": ("dark", options.dark), "--unit": ("unit", options.unit)}
+    named |= {"--channel": (labels[0] or "input", options.channel)} if len(labels) < 2 else {}
     texts |= {place: f"{x}={value}" for place, (x, value) in named.items() if value is not None}
-    if options.map is not None:
-        texts["--map"] = options.map
-    stated = dict[str, Any]()
+    texts |= {"--map": options.map} if options.map is not None else {}
+    settings = {*SETTINGS}.difference(labels)
     for place, text in texts.items():
-        channels, pairs = dict[str, int](), dict(form("assigned").findall(text) or [(text, "")])
-        settings = [name for name in pairs if name in SETTINGS and name not in file.labels]
-        for name in settings:
-            stated[name] = pairs.pop(name)
-            if not form(f"setting {name}").fullmatch(stated[name]):
-                raise refusal(place, "layout_unclear", text=f"{name}={stated[name]:.40}")
-        inputs = {x or "input": x for x in input_names(file, stated.get("groups"), gates)}
-        for label, channel in pairs.items():
-            if label not in inputs:
-                raise refusal(place, "input_unknown", text=label, inputs=", ".join(inputs))
-            if channel not in map(str, gates):
+        channels, pairs = dict[str, int](), form("assigned").findall(text) or [(text, "")]
+        for name, value in sorted(pairs, key=lambda pair: pair[0] not in settings):
+            inputs = {x or "input": x for x in input_names(file, stated.get("groups"), gates)}
+            if name in settings and form(f"setting {name}").fullmatch(value):
+                stated[name] = value
+            elif name in settings:
+                raise refusal(place, "layout_unclear", text=f"{name}={value:.40}")
+            elif name not in inputs:
+                raise refusal(place, "input_unknown", text=name, inputs=", ".join(inputs))
+            elif value in map(str, gates):
+                channels[inputs[name]] = int(value)
+            else:
                 accepted = f"INPUT=CHANNEL with a gate's channel: {', '.join(map(str, gates))}"
-                raise refusal(place, "not_accepted", text=f"{label}={channel}", accepted=accepted)
-            channels[inputs[label]] = int(channel)
+                raise refusal(place, "not_accepted", text=f"{name}={value}", accepted=accepted)
         stated |= {"channels": channels} if channels else {}
     return stated

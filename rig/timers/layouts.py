@@ -7,20 +7,20 @@ gates, and which gate each input is.
 from __future__ import annotations
 
 import itertools
-from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
-from functools import lru_cache
-from operator import attrgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import Any
 
+import numpy as np
+
+from rig.arrays import Index
 from rig.records import Drop, Edge
 from rig.timers.edge_rows import make_drop
-from rig.timers.moments import LONGEST_S, TICK_HZ
+from rig.timers.moments import TICK_HZ
+from rig.timers.signals import STATES, Changes
+from rig.timers.timer_file import TimerFile
 from rig.timers.vocabulary import POWERS, number_of
-
-if TYPE_CHECKING:
-    from rig.timers.events import TimerEvent, TimerFile
 
 _LONGEST_S = 60
 """A drop lasts half a second, and nobody waits a minute until it is recorded."""
@@ -44,8 +44,9 @@ class FileLayout:
         when a beam is blocked, ``inverted`` where it says the contrary; of times alone, whether the
         beam darkens and clears in turns, clears first (``turns-clear``), or darkens at ``each``.
     groups
-        Whether parts of the file are ``runs``, or its ``rows`` are, or in each run all gates stand
-        in the order of the way (``passing``).
+        Whether parts of the file are ``runs``, and parted where times begin anew; or such parts
+        have times in any order (``unsorted``); or runs are its ``rows``, or its ``columns`` of
+        times; or in each run all gates stand in the order of the way (``passing``).
     first
         Whether the first row of a log of changes is the ``state`` at the beginning or a ``change``.
     pause_s
@@ -61,31 +62,87 @@ class FileLayout:
     pause_s: float = 0.0
     channels: Mapping[str, int] = field(default_factory=dict)
 
-    def is_dark(self, event: TimerEvent, n: int) -> bool:
-        """Whether an event, the n-th of its input, begins a blocked beam."""
-        if event.state:
-            return (event.state in {"blocked", "high"}) is (self.dark not in {"inverted", "low"})
-        return self.dark == "each" or (n % 2 == 0) is (self.dark != "turns-clear")
-
     @property
     def text(self) -> str:
         """What ``--map`` accepts."""
-        stated = asdict(self) | {x or "input": channel for x, channel in self.channels.items()}
-        usual = "", 0.0, "states", "runs", "state", self.channels
-        pairs = ((x, y) for x, y in stated.items() if x not in SETTINGS or y not in usual)
-        return ",".join(f"{name}={value}" for name, value in pairs if name != "channels")
+        usual = FileLayout()
+        pairs = [(x, getattr(self, x)) for x in SETTINGS if getattr(self, x) != getattr(usual, x)]
+        pairs += [(x or "input", channel) for x, channel in self.channels.items()]
+        return ",".join(f"{name}={value}" for name, value in pairs)
 
     def __str__(self) -> str:
         return f"--map '{self.text}'"
 
 
-class FileReading(NamedTuple):
-    """Drops as a layout of a file gives them, and the lines that each run comes from."""
+class FileReading:
+    """Edges as a layout of a file gives them, run by run; runs without a number come last.
 
-    file: TimerFile
-    layout: FileLayout
-    drops: list[Drop]
-    lines: dict[int, list[int]]
+    Attributes
+    ----------
+    runs
+        Their numbers, in order.
+    places
+        Where the edges of each run begin, and where those of the last end.
+    firsts
+        Inputs whose first row is a beam that is blocked, at the beginning or by a change.
+    line, tick, channel, blocked
+        Of each edge: the line that it comes from, its time, ps, its gate, and the state after it.
+    """
+
+    def __init__(self, file: TimerFile, layout: FileLayout) -> None:
+        self.file, self.layout = file, layout
+        grouping = layout.unit, layout.groups, layout.pause_s
+        changes, drop, numbers = group_changes(file, *grouping)
+        label, channels = changes["label"], [layout.channels.get(name, -1) for name in file.names]
+        if layout.groups == "passing":  # of gates that are passed one by one, each has as many
+            channels = [*layout.channels.values()]
+            share = np.maximum(1, np.bincount(drop)[drop] // len(channels))
+            label = np.minimum(count_before(drop) // share, len(channels) - 1)
+        channel, state = np.array(channels)[label], changes["state"]
+        is_stated = np.isin(state, (STATES.index("blocked"), STATES.index("high")))
+        is_first = count_before(drop * (1 + len(channels)) + label) % 2 == 0
+        blocked = np.where(
+            state > 0,
+            is_stated ^ (layout.dark in {"inverted", "low"}),
+            is_first ^ (layout.dark == "turns-clear") | (layout.dark == "each"),
+        )
+        # A beam is clear at the beginning; a first row that says so changes nothing.
+        _, starts = np.unique(drop, return_index=True)
+        is_late = changes["tick"] > changes["tick"][starts][drop]
+        is_odd = changes["first"] & blocked & (channel >= 0) & ~is_late
+        self.firsts = [[*file.names][n] for n in np.unique(changes["label"][is_odd])]
+        is_change = ~changes["first"] | (blocked & (is_late | (layout.first == "change")))
+        is_edge = is_change & (channel >= 0)
+        drops, places = np.unique(drop[is_edge], return_inverse=True)
+        runs = numbers[drops]
+        runs = np.where(runs > 0, runs, runs.max(initial=0) + np.cumsum(runs == 0))[places]
+        order = np.flatnonzero(is_edge)[np.argsort(runs, kind="stable")]
+        self.line, self.tick = changes["line"][order], changes["tick"][order]
+        self.channel, self.blocked = channel[order], blocked[order]
+        runs, places = np.unique(np.sort(runs), return_index=True)
+        self.runs, self.places = runs.tolist(), np.append(places, len(order))
+
+    @cached_property
+    def drops(self) -> list[Drop]:
+        """The drops, a run each."""
+        return [self.drop(n) for n in range(len(self.runs))]
+
+    def drop(self, n: int) -> Drop:
+        """Return the n-th drop."""
+        part = slice(*self.places[n : n + 2])
+        columns = (x[part].tolist() for x in (self.tick, self.channel, self.blocked))
+        return make_drop(self.runs[n], list(map(Edge, *columns)))
+
+    @property
+    def lasting(self) -> list[int]:
+        """How long each drop lasts, ps."""
+        return [*(self.tick[self.places[1:] - 1] - self.tick[self.places[:-1]])]
+
+    @property
+    def key(self) -> int:
+        """What is the same for readings of the same edges."""
+        columns = self.places, self.tick, self.channel, self.blocked
+        return hash((*self.runs, *(tuple(column.tolist()) for column in columns)))
 
     @property
     def is_whole(self) -> bool:
@@ -93,69 +150,53 @@ class FileReading(NamedTuple):
 
         Where the file says when they are blocked, it is not doubted.
         """
-        counts = Counter((drop.run, edge.channel) for drop in self.drops for edge in drop.edges)
+        run = np.repeat(self.runs, np.diff(self.places))
+        _, first, counts = np.unique(
+            run * 100 + self.channel, return_index=True, return_counts=True
+        )
         if self.layout.dark.startswith("turns"):
-            return not any(n % 2 for n in counts.values())
-        began_dark = sum(drop.initial_state.bit_count() for drop in self.drops)
-        return self.layout.dark not in {"high", "low"} or began_dark < len(counts)
+            return not np.any(counts % 2)
+        return self.layout.dark not in {"high", "low"} or bool(np.any(self.blocked[first]))
 
 
-def read_drops(file: TimerFile, layout: FileLayout, most: int | None = None) -> FileReading:
-    """Turn what was understood into drops, a run each, numbered as in the file or from 1.
+@lru_cache(4)
+def group_changes(
+    file: TimerFile, unit: str, groups: str, pause_s: float
+) -> tuple[Changes, Index, Index]:
+    """Return changes by drops and times, which drop each is of, and what numbers drops have, or 0.
 
-    Parameters
-    ----------
-    most
-        How many are read, if not all.
+    In a file that says the drops, they are parted by no time; in others where times begin anew.
     """
-    runs, lines, last = dict[int, list[Edge]](), dict[int, list[int]](), 0
-    inputs, is_passing = [*layout.channels], layout.groups == "passing"
-    grouping = layout.unit, layout.groups, layout.first, layout.pause_s
-    for number, events in _group_events(file, *grouping)[:most]:
-        edges, rows, counts = list[Edge](), list[int](), Counter[str]()
-        share = max(1, len(events) // max(1, len(inputs)))
-        for k, event in enumerate(events):
-            # Of gates that are passed one after the other, each has as many.
-            label = inputs[min(k // share, len(inputs) - 1)] if is_passing else event.label
-            channel = layout.channels.get(label)
-            if channel is not None:
-                edges.append(Edge(event.tick, channel, layout.is_dark(event, counts[label])))
-                rows.append(event.line)
-                counts[label] += 1
-        if edges:
-            run = number if number and number not in runs else last + 1
-            runs[run], lines[run], last = edges, rows, max(last, run)
-    drops = [make_drop(run, runs[run]) for run in sorted(runs)]
-    if any(drop.edges[-1].tick > LONGEST_S * TICK_HZ for drop in drops):
-        drops, lines = [], {}
-    return FileReading(file, layout, drops, lines)
+    changes, rank = file.changes, file.changes["rank"]
+    part = changes[{"rows": "line", "columns": "clock"}.get(groups, "run")]
+    keys = np.stack([changes["block"] * (not file.has_runs), changes["run"], part])
+    order = np.lexsort((rank, changes["line"], *keys[::-1]))
+    is_new = np.any(np.diff(keys[:, order], prepend=-1) != 0, axis=0)
+    if file.is_stacked and groups in {"runs", "passing"}:
+        is_new |= np.diff(rank[order], prepend=0) < 0
+    drop = np.cumsum(is_new)
+    order = order[np.lexsort((rank[order], drop))]
+    # Nothing does the same twice at once.
+    same = np.stack([drop, *(changes[name][order] for name in ("rank", "label", "state"))])
+    is_other = np.any(np.diff(same, prepend=-1) != 0, axis=0)
+    changes, drops = changes[order][is_other], drop[is_other].astype(np.intp) - 1
+    changes["tick"] //= 10 ** POWERS[unit or "s"]
+    if pause_s:
+        is_late = np.diff(changes["tick"], prepend=0) >= round(pause_s * TICK_HZ)
+        drops += np.cumsum(is_late & (np.diff(drops, prepend=-1) == 0))
+    _, starts = np.unique(drops, return_index=True)
+    numbers = np.array([number_of(name) or 0 for name in file.names])[changes["run"][starts]]
+    _, known = np.unique(numbers, return_index=True)
+    return changes, drops, np.where(np.isin(np.arange(len(numbers)), known), numbers, 0)
 
 
-@lru_cache(1)
-def _group_events(
-    file: TimerFile, unit: str, groups: str, first: str, pause_s: float
-) -> list[tuple[int, list[TimerEvent]]]:
-    """Return the events of each drop, with its number in the file; those without one come last."""
-    limit, scale = round(pause_s * TICK_HZ), 10 ** POWERS[unit or "s"]
-    by_row = file.is_wide and groups != "runs"
-    parts: dict[tuple[str, int], list[TimerEvent]] = defaultdict(list)
-    for event in [file.first, *file.events] if file.first and first == "change" else file.events:
-        parts[event.run, event.line if by_row else event.part].append(event)
-    numbers = {run: number_of(run) or 0 for run, _ in parts}
-    drops = []
-    for run, part in sorted(parts, key=lambda x: (not numbers[x[0]], x[1], numbers[x[0]])):
-        pieces: list[list[TimerEvent]] = [[]]
-        events = parts[run, part]
-        if scale > 1:
-            events = [event._replace(tick=event.tick // scale) for event in events]
-        for event in sorted(events, key=attrgetter("tick")):  # equal ones stay in order
-            last = pieces[-1][-1] if pieces[-1] else event
-            if 0 < limit <= event.tick - last.tick:
-                pieces.append([])
-            if last is event or event[:3] != last[:3]:  # nothing does the same twice at once
-                pieces[-1].append(event)
-        drops += [(numbers[run] if len(pieces) == 1 else 0, piece) for piece in pieces]
-    return drops
+def count_before(keys: Index) -> Index:
+    """Return for each key how many equal ones are before it."""
+    order = np.argsort(keys, kind="stable")
+    _, starts, counts = np.unique(keys[order], return_index=True, return_counts=True)
+    before = np.empty_like(order)
+    before[order] = np.arange(len(order)) - np.repeat(starts, counts)
+    return before
 
 
 def input_names(file: TimerFile, groups: str | None, gates: Sequence[int]) -> list[str]:
@@ -176,15 +217,17 @@ def find_layouts(
     stated
         What is decided: attributes of `FileLayout`.
     """
-    counts = Counter((event.part, event.label) for event in file.events)
-    states = {event.state for event in file.events}
-    levels = ["high", "low"] if states & {"high", "low"} else ["states"]
+    state, groups = file.changes["state"], _groupings(file, gates, bars)
+    changes, drop, _ = group_changes(file, "", groups[0], 0.0)
+    most = 1 + count_before(drop * len(file.names) + changes["label"]).max(initial=0)
+    is_signal = np.any(state > STATES.index("blocked"))
+    levels = ["high", "low"] if is_signal else ["states", "inverted"]
     # More times than bars: it darkens and clears in turns.
-    times = ["each", "turns", "turns-clear", "each"][max(counts.values()) > bars :][:3]
+    times = ["turns", "turns-clear", "each"] if most > bars else ["each", "turns", "turns-clear"]
     choices: dict[str, Sequence[Any]] = {} if file.has_unit else {"unit": list(POWERS)}
-    choices["dark"] = levels if states - {""} else times
-    choices["groups"] = _groupings(file, gates, bars)
-    choices["first"] = ["state", "change"] if file.first else ["state"]
+    choices["dark"] = levels if np.any(state) else times
+    choices["groups"] = groups
+    choices["first"] = ["state", "change"] if np.any(file.changes["first"]) else ["state"]
     choices |= {name: [value] for name, value in stated.items() if name in choices}
     for values in itertools.product(*choices.values()):
         layout = FileLayout(**dict(zip(choices, values, strict=True)))
@@ -195,14 +238,13 @@ def find_layouts(
 
 
 def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
-    groups, events = ["runs"], file.events
-    # Times that begin anew with each row are of a drop each; of those that go on, pauses tell.
-    is_wide = file.is_wide and len({event.line for event in events}) < len(events)
-    if is_wide and events != sorted(events, key=attrgetter("tick")):
-        groups.insert(0, "rows")
-    if len(file.labels) < 2 and bars == 1 and len(gates) > 1:
-        groups.append("passing")
-    return groups
+    """Return how changes may be put into runs; those of rows first where times begin anew."""
+    groups = ["runs", *["unsorted"] * file.is_stacked]
+    if file.is_wide:
+        groups += ["rows", "columns"]
+        groups = groups[:: -1 if np.any(np.diff(file.changes["tick"]) < 0) else 1]
+    is_wire = len(file.labels) < 2 and bars == 1 and len(gates) > 1
+    return groups + ["passing"] * is_wire
 
 
 def _pauses(file: TimerFile, layout: FileLayout) -> list[float]:
@@ -211,8 +253,8 @@ def _pauses(file: TimerFile, layout: FileLayout) -> list[float]:
     Between drops nothing passes for far longer than within one: of the pauses in order, the first
     of half a second or more that is three times as long as the one before.
     """
-    drops = _group_events(file, layout.unit, layout.groups, "state", 0.0)
-    ticks = [event.tick for event in drops[0][1]] if len(drops) == 1 else []
+    changes, drop, _ = group_changes(file, layout.unit, layout.groups, 0.0)
+    ticks = changes["tick"].tolist() if not np.any(drop) else []
     pauses = sorted(b - a for a, b in itertools.pairwise(ticks))
     for before, pause in itertools.pairwise(pauses):
         if pause >= max(_CLEAR_PAUSE * before, TICK_HZ / 2):
@@ -221,20 +263,16 @@ def _pauses(file: TimerFile, layout: FileLayout) -> list[float]:
 
 
 def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list[dict[str, int]]:
-    """Return which gate each input may be; by its number if all are told apart by it."""
+    """Return which gate each input may be: by its number, or in the order of their passages."""
     labels = input_names(file, layout.groups, gates)
     if layout.groups == "passing":
         return [dict(zip(labels, gates, strict=True))]
     by_number = {x: n for x in labels if (n := number_of(x)) is not None and n in gates}
-    if len(set(by_number.values())) == len(labels) and not file.is_counted:
+    if len(set(by_number.values())) == len(labels):
         return [by_number]
-    first = {event.label: event.tick for event in sorted(file.events, reverse=True)}
-    passed = sorted(labels, key=lambda label: first.get(label, 0))
-    # In order of their numbers, or as they are passed first; and the reverse.
-    maps = [
-        dict(zip(order, chosen[::way], strict=True))
-        for order, beams in ((labels, sorted(gates)), (passed, gates))
-        for chosen in itertools.combinations(beams, len(labels))
-        for way in (1, -1)
-    ]
+    later = file.changes[~file.changes["first"]][::-1]
+    first = dict(zip(later["label"].tolist(), later["tick"], strict=True))
+    passed = sorted(labels, key=lambda label: first.get(file.names[label], 0))
+    chosen = itertools.combinations(gates, len(labels))
+    maps = [dict(zip(passed, beams, strict=True)) for beams in chosen]
     return maps[:_MOST_MAPS] or [by_number] * bool(by_number)

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from datetime import date
 from decimal import ROUND_HALF_EVEN, Context
-from typing import TYPE_CHECKING
+from fractions import Fraction
 
 from rig.timers.vocabulary import POWERS, form, is_number, unit_of
-
-if TYPE_CHECKING:
-    from fractions import Fraction
 
 TICK_HZ = 10**12
 LONGEST_PS = 10**33
@@ -54,10 +51,6 @@ def moment(text: str, power: int = 0) -> int | None:
 
 def picoseconds(text: str, power: int = 0) -> int | None:
     """Read a decimal number of 10^power s as picoseconds, ties to even; `None` for another text."""
-    whole, _, part = text.partition(".")
-    digits, zeros = whole + part, 12 + power - len(part)
-    if zeros >= 0 and len(digits) + zeros < 33 and digits.isdecimal() and digits.isascii():
-        return int(digits + "0" * zeros)  # as most times are: a Decimal costs ten times as much
     if not is_number(text):
         return None
     number = _EXACT.scaleb(_EXACT.create_decimal(text), 12 + power)

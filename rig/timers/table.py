@@ -11,7 +11,7 @@ import csv
 import itertools
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -20,28 +20,112 @@ from rig.timers.vocabulary import LONGEST, form, is_measured, is_number, kinds_o
 
 TimeBase = tuple[float, float]
 """When the first sample was taken, and the time between two, s."""
-_COLUMN_ROLES = {"time", "elapsed", "state", "edge", "volts", "gate", "run", "duration"}
-_COLUMN_ROLES |= {"index", "derived"}
+_COLUMN_ROLES = {
+    *("time", "elapsed", "state", "edge", "volts"),
+    *("gate", "run", "duration", "index", "derived"),
+}
+_UNFILLED = {"setting", "index", "derived"}
+"""Roles of columns that may have a name and no values: a rate, comments, or distances."""
 _UNFILLED = {"setting", "index", "derived"}
 """Roles of columns that may have a name and no values: a rate, comments, or distances."""
 _PREFIXES = {"k": 3, "m": 6, "g": 9}
+_JUDGED = 100
+"""Lines in which values are counted."""
 _SAMPLE = 500
 """Lines that show how a file is written; without a row among them it is no table."""
 
 
+@dataclass(eq=False, slots=True)
+class RowBlock:
+    """What stands above rows that stand together.
+
+    Attributes
+    ----------
+    remarks
+        Of the whole file, as far as read.
+    above
+        Headings of the block before.
+    number
+        How many are before it, but for those of other gates in the same run.
+    gate
+        Which all its rows are of; empty where no mark says so.
+    headings
+        Its own, without such marks.
+    width
+        How many cells the first row has.
+    key
+        What is the same for blocks whose columns are.
+    """
+
+    remarks: list[Row] = field(default_factory=list)
+    above: list[Row] = field(default_factory=list)
+    number: int = 0
+    gate: str = ""
+    headings: list[Row] = field(default_factory=list)
+    width: int = 0
+    key: object = None
+
+    def begin(self, width: int) -> None:
+        """Begin its rows: one without a heading as wide as these has that of the block above."""
+        self.width = width
+        if all(len(row.texts) != width for row in self.headings):
+            self.headings += self.above
+        self.key = width, *(tuple(row.texts) for row in self.headings)
+
+    def find_heading(self, width: int) -> Row | None:
+        """Return the row with most cells that are known; above and below may stand symbols, units.
+
+        A row with a measured number, or with more or fewer names than there are columns, is a
+        setting. A remark may name the columns where nothing else does.
+        """
+        is_numbered = form("time and numbers").fullmatch
+        remarks = (row for row in self.remarks if not form("assignment").search(row.texts[0]))
+        rows = [
+            row
+            for row in self.headings or [row for row in remarks if len(row.texts) == width]
+            if row.known
+            and len(row.texts) > width - 2  # rows may end with a separator
+            and all(_UNFILLED & roles_in(text) for text in filter(None, row.texts[width:]))
+            and (is_numbered(row.raw) or not any(map(is_measured, row.texts[:width])))
+        ]
+        return max(rows, key=lambda row: (row.known, len("".join(row.texts))), default=None)
+
+    def find_time_base(self) -> TimeBase | None:
+        """Return the first sample's time and the step, s, that settings state; `None` without."""
+        stated, rows = dict[str, float](), [*self.remarks, *self.headings]
+        for above, below in itertools.pairwise([*rows, *rows[-1:]]):
+            for n, text in enumerate(above.texts):
+                name, *inside = form("assignment").split(text[:60], 1)
+                places = map(str.strip, (*inside, above.cell(n + 1), below.cell(n)))
+                quantity = next(filter(None, map(form("quantity").fullmatch, places)), None)
+                role = next((x for x in ("rate", "start", "step") if x in roles_in(name)), "")
+                if role and quantity:
+                    number, prefix, unit = quantity.groups("")
+                    power = vocabulary.POWERS.get(vocabulary.unit_of(unit.lower()), 0)
+                    power = _PREFIXES.get(prefix.lower(), 0) - power
+                    stated.setdefault(role, float(number.replace(",", ".")) * 10.0**power)
+        step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
+        return (stated.get("start", 0.0), step) if step else None
+
+    def find_inputs(self, count: int) -> list[str]:
+        """Return names of inputs without a heading: those of a row that lists as many."""
+        texts = ([x.rpartition(":")[2] for x in r.texts] for r in [*self.remarks, *self.headings])
+        labels = ([vocabulary.find_label(text, "gate") for text in row] for row in texts)
+        named = ([*filter(None, row)] for row in labels)
+        return next((names for names in named if len(names) == count), [])
+
+
 class Row(NamedTuple):
-    """A line: its number, from 1, what its cells say, and how it was written."""
+    """A line: its number, from 1, what its cells say, how it was written, and its block."""
 
     line: int
     texts: list[str]
     raw: str = ""
+    block: RowBlock = RowBlock()
 
     def cell(self, at: int) -> str:
         """Return what a column, from 0, has; nothing where the row ends before it."""
-        text = self.texts[at] if at < len(self.texts) else ""
-        if not text or text[0].isdigit():  # as most
-            return text
-        return "" if text[:5].casefold() in vocabulary.words()["missing"] else text
+        return self.texts[at] if at < len(self.texts) else ""
 
     @property
     def known(self) -> int:
@@ -54,11 +138,6 @@ class Row(NamedTuple):
         """Whether it says that another run, or gate, begins: ``--- Run 2 ---``."""
         text = vocabulary.normal(" ".join(self.texts)).strip("-=*#:<>[] ")
         return form("mark").fullmatch(text) is not None
-
-    @property
-    def is_gate(self) -> bool:
-        """Whether it is such a mark of a gate."""
-        return self.is_mark and vocabulary.find_label(self.raw, "gate") != ""
 
     @property
     def has_units(self) -> bool:
@@ -80,87 +159,6 @@ class Row(NamedTuple):
         return self.line, begin + 1
 
 
-@dataclass(eq=False, slots=True)
-class RowBlock:
-    """Rows that stand together.
-
-    Attributes
-    ----------
-    headings, above
-        What stands above them, and above those of the block before.
-    width
-        How many cells the first one has.
-    remarks
-        Of the whole file, as far as read.
-    """
-
-    headings: list[Row] = field(default_factory=list)
-    above: list[Row] = field(default_factory=list)
-    width: int = 0
-    remarks: list[Row] = field(default_factory=list)
-
-    def begin(self, width: int) -> None:
-        """Begin its rows: one without a heading as wide as these has that of the block above."""
-        self.width = width
-        if all(len(row.texts) != width for row in self.headings):
-            self.headings += [row for row in self.above if not row.is_mark]
-
-    @property
-    def is_gate(self) -> bool:
-        """Whether a gate stands above it, so that it is of the run of the block before."""
-        return any(row.is_gate for row in self.headings)
-
-    @property
-    def key(self) -> object:
-        """What is the same for blocks whose columns are: all above but the run's name."""
-        rows = (row for row in self.headings if row.is_gate or not row.is_mark)
-        return self.width, *(tuple(row.texts) for row in rows)
-
-    def find_heading(self, filled: Collection[int], width: int) -> Row | None:
-        """Return the row with most cells that are known; above and below may stand symbols, units.
-
-        A row with a measured number, or with more names than there are columns, is a setting. A
-        remark may name the columns where nothing else does.
-        """
-        is_numbered = form("time and numbers").fullmatch
-        remarks = (row for row in self.remarks if not form("assignment").search(row.texts[0]))
-        rows = [
-            row
-            for row in self.headings or [row for row in remarks if len(row.texts) == width]
-            if row.known
-            and not row.is_mark
-            and (len(row.texts) > 1 or len(filled) == 1)
-            and all(_UNFILLED & roles_in(text) for text in filter(None, row.texts[width:]))
-            and (is_numbered(row.raw) or not any(map(is_measured, row.texts[:width])))
-        ]
-        return max(rows, key=lambda row: (row.known, len("".join(row.texts))), default=None)
-
-    def find_time_base(self) -> TimeBase | None:
-        """Return the first sample's time and the step, s, that settings state; `None` without."""
-        stated: dict[str, float] = {}
-        for above, below in itertools.pairwise([*self.remarks, *self.headings, Row(0, [])]):
-            for n, text in enumerate(above.texts):
-                name, *inside = form("assignment").split(text[:60], 1)
-                places = map(str.strip, (*inside, above.cell(n + 1), below.cell(n)))
-                quantity = next(filter(None, map(form("quantity").fullmatch, places)), None)
-                role = next((x for x in ("rate", "start", "step") if x in roles_in(name)), "")
-                if role and quantity:
-                    number, prefix, unit = quantity.groups("")
-                    power = vocabulary.POWERS.get(vocabulary.unit_of(unit.lower()), 0)
-                    power = _PREFIXES.get(prefix.lower(), 0) - power
-                    stated.setdefault(role, float(number.replace(",", ".")) * 10.0**power)
-        step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
-        return (stated.get("start", 0.0), step) if step else None
-
-    def find_inputs(self, count: int) -> list[str]:
-        """Return names of inputs without a heading: those of a row that lists as many."""
-        for row in [*self.remarks, *self.headings]:
-            labels = [vocabulary.find_label(text.rpartition(":")[2], "gate") for text in row.texts]
-            if len(names := [label for label in labels if label]) == count:
-                return names
-        return []
-
-
 class Table:
     """A text file of rows.
 
@@ -180,102 +178,89 @@ class Table:
     """
 
     def __init__(self, lines: Iterable[tuple[int, str]]) -> None:
-        self.remarks, self.strays = list[Row](), list[int]()
+        self.remarks, self.strays = list[Row](), list[Row]()
         unwrapped = (pair for number, line in lines for pair in _unwrap(number, line))
         sample = list(itertools.islice(unwrapped, _SAMPLE))
         self._lines = itertools.chain(sample, unwrapped)
         plain = [line for _, line in sample if line.strip() and not vocabulary.is_remark(line)]
-        self._names = _find_names(plain)
-        self.separator = "" if self._names else find_separator(plain)
+        self._names = _find_names(plain[-_JUDGED:])
+        self.separator = find_separator(plain, self._names)
         self._usual: tuple[tuple[bool, bool], ...] = ()
         shapes = Counter(x for x in (_shape(self.split(y)) for y in plain) if any(map(all, x)))
         self._fewest = 1 + (2 * sum(n for x, n in shapes.items() if len(x) > 1) > shapes.total())
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
 
-    def blocks(self) -> Iterator[tuple[RowBlock, Iterator[Row]]]:
-        """Yield blocks of rows; the rows of each are to be taken before the next."""
-        for block, pairs in itertools.groupby(self._rows(), key=lambda pair: pair[0]):
-            yield block, (row for _, row in pairs)
-
     def split(self, line: str) -> list[str]:
-        """Split a line into cells; numbers get a decimal point."""
-        if self._names:
+        """Split a line into cells; numbers get a decimal point, and what is missing is empty."""
+        if not self.separator:
             values = dict(_named_values(line))
             return [values.get(name, "") for name in self._names] if any(values) else [line]
         cells = split_cells(line, self.separator, len(self._usual))
-        if "," not in line:  # as most
+        if form("plain row").fullmatch(line) and "," not in line:  # as most
             return cells
-        has_comma = form("decimal comma").fullmatch
-        return [t.replace(",", ".") if has_comma(t[:LONGEST]) else t for t in cells]
+        missing, has_comma = vocabulary.words()["missing"], form("decimal comma").fullmatch
+        cells = ["" if text[:5].casefold() in missing else text for text in cells]
+        return [text.replace(",", ".") if has_comma(text[:LONGEST]) else text for text in cells]
 
-    def _rows(self) -> Iterator[tuple[RowBlock, Row]]:
-        """Yield each row of data with its block."""
-        block = RowBlock([Row(0, self._names)] if self._names else [], remarks=self.remarks)
-        is_plain = form("plain row").fullmatch
+    def rows(self) -> Iterator[Row]:
+        """Yield each row of data."""
+        block, is_plain = RowBlock(self.remarks, []), form("plain row").fullmatch
+        block.headings += [Row(0, self._names, "", block)] if not self.separator else []
         for number, line in self._lines:
-            if not line.strip():
-                continue
-            if block.width and is_plain(line):
-                yield block, Row(number, self.split(line), line)
+            if block.width and is_plain(line):  # as most
+                yield Row(number, self.split(line), line, block)
                 continue
             mark = form("remark").match(line[:LONGEST])
             text = line[mark.end() :].rstrip('" ') if mark else line
-            row = Row(number, self.split(text), line)
-            self.remarks += [row] if mark and number <= _SAMPLE else []
-            if row.is_mark if mark else block.width > 0 and self._begins_block(row, block):
-                above = [*([] if block.width else block.above), *block.headings]
-                block = RowBlock([row], above, remarks=self.remarks)
-            elif not mark and self._is_row(row, block):
+            row = Row(number, self.split(text), line, block)
+            if row.is_mark if mark or not block.width else self._begins_block(row):
+                gate = vocabulary.find_label(line, "gate") if row.is_mark else ""
+                above = block.headings if block.width else [*block.above, *block.headings]
+                block = RowBlock(self.remarks, above[:_SAMPLE], block.number + (not gate), gate)
+                block.headings += [] if row.is_mark else [row]
+            elif mark:
+                self.remarks += [row] if number <= _SAMPLE else []
+            elif self._is_row(row):
                 if not block.width:
                     block.begin(len(row.texts))
-                yield block, row
-            elif not mark and any(row.texts):
-                if block.width:
-                    self.strays.append(number)
-                elif len(block.headings) > _SAMPLE:
+                yield row
+            elif any(row.texts):
+                if len(block.headings) > _SAMPLE:
                     return
-                else:
-                    block.headings.append(row)
+                (self.strays if block.width else block.headings).append(row)
 
-    def _begins_block(self, row: Row, block: RowBlock) -> bool:
+    def _begins_block(self, row: Row) -> bool:
         """Whether a row below others is a mark, or a heading, of further ones."""
         if any(map(is_number, row.texts)):  # most are rows
             return not row.raw[:1].isdigit() and row.is_mark
-        is_again = row.texts in [above.texts for above in block.headings]
+        is_again = row.texts in [above.texts for above in row.block.headings]
         return is_again or row.is_mark or 0 < len(row.texts) <= 2 * row.known
 
-    def _is_row(self, row: Row, block: RowBlock) -> bool:
-        texts, shape, usual = row.texts, _shape(row.texts), self._usual
-        if usual and not any(is_filled for is_filled, _ in usual[:2]):
-            # Samples of an oscilloscope, beside which settings may stand.
-            shape = tuple(a if b[0] else b for a, b in zip(shape, usual, strict=False))
+    def _is_row(self, row: Row) -> bool:
+        """Whether it has values only, and at least a number or a date, or looks as if it had."""
         # Above rows of several cells may stand a date, or a count.
-        if shape == usual or (len(texts) >= self._fewest and _is_data(texts)):
+        is_data = len(row.texts) >= self._fewest and any(map(is_measured, row.texts))
+        is_data &= all(map(kinds_of, filter(None, row.texts)))
+        if is_data or _shape(row.texts) == self._usual:
             return True
         # One of data with a fault: some of it is a number, as in those above, or below their names.
-        if not any(map(is_number, texts)):
-            return False
-        named = {len(above.texts) for above in block.headings if len(above.texts) == above.known}
-        return len(texts) == block.width or len(texts) in named
+        above = (x.texts for x in row.block.headings if len(x.texts) == x.known)
+        widths = {row.block.width, *map(len, above)}
+        return any(map(is_number, row.texts)) and len(row.texts) in widths
 
 
 def split_cells(line: str, separator: str, usual: int = 0) -> list[str]:
     """Split a line into cells, without the blanks and the quotes around them."""
     if separator == " ":
         # A heading has names of several words: two blanks or more part them.
-        cells = _words(line)
+        cells = [word.strip('":') for word in line.split()]
         is_row = len(cells) == usual or all(map(kinds_of, cells))
         return cells if is_row else re.split(r" {2,}|\t", line.strip())
     if '"' in line:
         (cells,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
         return [text.strip().strip('"').strip() for text in cells]
     return [text.strip() for text in line.split(separator)]
-
-
-def _words(line: str) -> list[str]:
-    """Return the words of a line, without quotes and without what a sentence has behind them."""
-    return [word.strip('":') for word in line.split()]
 
 
 def _unwrap(number: int, line: str) -> list[tuple[int, str]]:
@@ -298,37 +283,36 @@ def _named_values(line: str) -> list[tuple[str, str]]:
 
 
 def _find_names(lines: Sequence[str]) -> list[str]:
-    """Return what most lines that have values name before these; nothing if they do not."""
-    rows = [tuple(name for name, _ in _named_values(line)) for line in lines[:100]]
-    usual, count = next(iter(Counter(filter(None, rows)).most_common(1)), ((), 0))
-    marks = [[line.count(mark) for mark in "\t;,"] for line in lines[:100]]
+    """Return what most lines name before their values; nothing if they name none, or one."""
+    rows = [tuple(name for name, _ in _named_values(line)) for line in lines]
+    usual, count = Counter(filter(None, rows)).most_common(1)[0] if any(rows) else ((), 0)
     is_named = len(set(usual) - {""}) > 1 and 2 * count > sum(map(bool, rows))
-    # Below a heading with as many cells, words beside values are parts of cells: Gate 1, Run 2.
-    heads = [cells for row, cells in zip(rows, marks, strict=True) if not row and any(cells)]
-    is_named &= not any(cells in heads for row, cells in zip(rows, marks, strict=True) if row)
     return list(dict.fromkeys(usual)) if is_named else []
 
 
-def find_separator(lines: Sequence[str]) -> str:
-    """Find what stands between the cells: what leaves most values in the lines with a number."""
-    rows = [line[:1000].strip() for line in lines if re.search("[0-9]", line[:1000])]
-    for separator in "\t;|":
-        if sum(separator in row for row in rows) * 2 > len(rows):
-            return separator
+def find_separator(lines: Sequence[str], names: Sequence[str]) -> str:
+    """Find what stands between the cells: what leaves most values in the lines with a number.
+
+    Parameters
+    ----------
+    names
+        Words before values, if these may stand between words; then nothing is between them.
+    """
+    rows = [line[:1000] for line in lines if re.search("[0-9]", line[:1000])][-_JUDGED:]
     is_named = any(re.search("[A-Za-z][A-Za-z0-9]", line) and "," in line for line in lines[:200])
-    numbers = [row.replace(",", ".") for row in rows if form("decimal comma").fullmatch(row)]
-    if not is_named and len(numbers) * 2 > len(rows):
-        # 0,25 below 1,5 is no decimal comma: times go on.
-        return ";" if sorted(numbers, key=float) == numbers else ","
-    # Blanks part values; a comma behind one parts them, too.
-    parted = [_words(row) for row in rows if ", " not in row and " " in row]
-    return " " if sum(all(map(kinds_of, row)) for row in parted) * 2 > len(rows) else ","
-
-
-def _is_data(texts: Sequence[str]) -> bool:
-    """Whether cells hold values only, and at least one number or date."""
-    kinds = [kinds_of(text) for text in texts if text]
-    return all(kinds) and any(is_measured(text) for text in texts)
+    numbers = [
+        row.strip().replace(",", ".")
+        for row in rows
+        if form("decimal comma").fullmatch(row.strip())
+    ]
+    if 2 * len(numbers) > len(rows) and not is_named and sorted(numbers, key=float) == numbers:
+        return ";"  # times go on with decimal commas; 0,25 below 1,5 is no decimal comma
+    counts = {"": (sum(len(_named_values(row)) for row in rows), 0)} if names else {}
+    marks = [mark for mark in "\t;|" if 2 * sum(mark in row for row in rows) > len(rows)]
+    for mark in marks or ", ":
+        cells = [kinds_of(text) for row in rows for text in split_cells(row, mark) if text]
+        counts[mark] = 2 * sum(map(bool, cells)) - len(cells), len(cells)
+    return max(counts, key=counts.__getitem__)
 
 
 def _shape(texts: Sequence[str]) -> tuple[tuple[bool, bool], ...]:

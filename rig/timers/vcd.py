@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
+from rig.timers.problems import ProblemList
 from rig.timers.vocabulary import POWERS, form
-
-if TYPE_CHECKING:
-    from rig.timers.problems import ProblemList
 
 BEGINNINGS = ("$date", "$version", "$timescale", "$comment", "$scope", "$var")
 _LONGEST_HEAD = 1_000_000

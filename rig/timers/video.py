@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.reasons import make_reason
 from rig.timers.lines import read_lines
 from rig.timers.problems import ProblemList
-from rig.timers.table import RowBlock, Table
+from rig.timers.table import Row, Table
 from rig.timers.vocabulary import form, is_number
-
-if TYPE_CHECKING:
-    from rig.arrays import Array
-    from rig.timers.table import Row
 
 FEWEST = 6
 """Frames that tell an acceleration and how much they scatter."""
@@ -41,25 +38,23 @@ def read_video(path: str | Path) -> VideoTrack:
         Another kind of file, too few frames, or values that are no numbers, at their places.
     """
     problems = ProblemList(str(path), make_reason("video_files").text)
-    block, rows = next(Table(enumerate(read_lines(path), 1)).blocks(), (RowBlock(), iter(())))
-    headings = [row for row in block.headings if len(_find_axes(row)) == len(_SCALES)]
-    if not headings:
+    rows = list(Table(enumerate(read_lines(path), 1)).rows())
+    above = rows[0].block.headings if rows else []
+    heading = next((row for row in above[::-1] if len(_find_axes(row)) == len(_SCALES)), None)
+    if heading is None:
         problems.refuse(1, 1, "no_track")
-    heading, axes = headings[-1], _find_axes(headings[-1])
-    for name, (n, unit) in axes.items():
+    columns = []
+    for name, (n, unit) in sorted(_find_axes(heading).items()):
         if unit not in _SCALES[name]:
             accepted = f"a unit of this column: {', '.join(filter(None, _SCALES[name]))}"
             problems.reject(*heading.place(n), heading.cell(n), unit, accepted)
-    frames = []
-    for row in rows:
-        cells = {name: row.cell(n) for name, (n, _) in axes.items()}
-        for name, text in cells.items():
-            if text and not is_number(text):
-                problems.reject(*row.place(axes[name][0]), name, text, "a number")
-        frames += [[cells[name] for name in _SCALES]] if all(cells.values()) else []
-    problems.raise_if_any()
-    scales = [_SCALES[name][axes[name][1]] for name in _SCALES]
-    track = VideoTrack(*(np.array(frames, dtype=float).reshape(-1, 3) * scales).T)
+        for row in rows:
+            if (text := row.cell(n)) and not is_number(text):
+                problems.reject(*row.place(n), name, text, "a number")
+        problems.raise_if_any()
+        columns.append([float(row.cell(n) or "nan") * _SCALES[name][unit] for row in rows])
+    places = np.array(columns)
+    track = VideoTrack(*places[:, ~np.isnan(places).any(axis=0)])
     if track.times.size < FEWEST or not np.all(np.diff(track.times) > 0):
         problems.refuse(1, 1, "few_frames", frames=track.times.size, needed=FEWEST)
     return track

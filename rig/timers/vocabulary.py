@@ -34,23 +34,18 @@ def form(name: str) -> re.Pattern[str]:
     return re.compile(_expand(name))
 
 
+@cache
 def _expand(name: str) -> str:
-    forms = dict(read_rows("forms.txt", " ; "))
-    return re.sub("<([a-z ]+)>", lambda match: _part(match[1]), forms.get(name, name))
-
-
-def _part(name: str) -> str:
-    if name in dict(read_rows("forms.txt", " ; ")):
-        return f"(?:{_expand(name)})"
-    role = name.removeprefix("long ")
+    forms, role = dict(read_rows("forms.txt", " ; ")), name.removeprefix("long ")
+    if name in forms or role not in words():
+        within = forms.get(name, name)
+        return re.sub("<([a-z ]+)>", lambda match: f"(?:{_expand(match[1])})", within)
     known = (word for word in words()[role] if role == name or len(word) > 2)
     return f"(?i:{'|'.join(sorted(map(re.escape, known), key=len, reverse=True))})"
 
 
 def without_accents(text: str) -> str:
     """Return a text in which accents are left out and compatible letters are the same."""
-    if text.isascii():
-        return text
     parts = unicodedata.normalize("NFKD", text)
     return "".join(part for part in parts if not unicodedata.combining(part))
 

@@ -6,8 +6,7 @@ from contextlib import suppress
 import pytest
 
 from rig.errors import InputError
-from rig.timers.events import TimerFile
-from rig.timers.timer_file import read_file
+from rig.timers.timer_file import TimerFile, read_file
 from tests.cli.lab import PROTOCOLS
 from tests.timers.shapes import RUNS, shapes
 
@@ -63,6 +62,12 @@ def test_a_gate_that_the_file_lacks_is_said(look):
     assert "the file has nothing of the gates at channels 2" in done.err
 
 
+def test_a_single_edge_bears_nothing_out(look):
+    done = look("Time [s],Channel 0\n0.0,1\n0.4206,0\n0.9,0\n")
+    assert done.code == 2
+    assert "at most 50 % of its edges" in done.err
+
+
 def test_more_edges_than_the_object_makes_are_refused(look):
     content = HEAD + rows((t, 1, d) for t, _, d in RUNS[0])
     assert look(content).code == 2
@@ -91,9 +96,16 @@ def test_what_no_fall_decides_is_asked_with_the_line_to_add(look):
     assert "--map 'dark=" in done.err
 
 
-@pytest.mark.parametrize("name", ["Gates below each other", "Milliseconds without a unit"])
-def test_what_the_dry_run_prints_is_accepted(look, tmp_path, name):
-    content = shapes()[name].content
+@pytest.mark.parametrize(
+    "content",
+    [
+        shapes()["Gates below each other"].content,
+        shapes()["Milliseconds without a unit"].content,
+        HEAD + rows(RUNS[0][::-1]),
+        "Run,gate 0 (s),gate 1 (s)\n1,0.40031,0.553153\n2,0.370305,0.523153\n",
+    ],
+)
+def test_what_the_dry_run_prints_is_accepted(look, tmp_path, content):
     saved = tmp_path / "map.txt"
     first = look(content, "--map-file", saved)
     assert first.code == 0, first.err

@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from rig.errors import InputError
 from rig.records import Drop, Edge
 from rig.timers import lines
-from rig.timers.edge_rows import edges_text
+from rig.timers.edge_rows import edges_text, read_edges
 from rig.timers.moments import TICK_HZ
-from tests.timers.edges import read_edges
 
 HEADER = "run,channel,time_s,state\n"
 

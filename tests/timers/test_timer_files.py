@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from itertools import pairwise
+from itertools import compress, pairwise
 from pathlib import Path
 
 import pytest
@@ -14,11 +14,10 @@ from rig.errors import InputError
 from rig.records import Drop
 from rig.timers import signals
 from rig.timers.edge_rows import is_own
-from rig.timers.events import TimerFile
-from rig.timers.layouts import find_layouts, read_drops
+from rig.timers.layouts import FileReading, find_layouts
 from rig.timers.lines import read_lines
 from rig.timers.moments import TICK_HZ
-from rig.timers.timer_file import read_file
+from rig.timers.timer_file import TimerFile, read_file
 from tests.examples import examples
 from tests.timers.test_edges_csv import faults_of
 from tests.timers.test_edges_csv import read as read_own
@@ -33,7 +32,7 @@ def drops_of(file, channels: dict[str, int], bars: int, dark: str | None = None)
     """Read a file in the most usual way, its inputs being as given."""
     stated = {"channels": channels} | ({"dark": dark} if dark else {})
     layout = next(find_layouts(file, list(channels.values()), bars, stated))
-    return read_drops(file, layout).drops
+    return FileReading(file, layout).drops
 
 
 def read(tmp_path: Path, content: str | bytes, bars: int = 8) -> list[Drop]:
@@ -218,14 +217,18 @@ def _row(times, separator=","):
 def test_tables_of_telephones_and_of_several_gates_beside_each_other(tmp_path, text, passed):
     path = tmp_path / "table.csv"
     path.write_text(text, "utf-8")
-    run = sorted(read_file(TimerFile(path)).events, key=lambda event: event.line)
-    origin = min(one.tick for one in run) - round(FALL[0] * TICK_HZ)  # of a date it is far away
-    found = {}
-    for one in run:
-        found.setdefault(one.label, []).append((one.tick - origin) / TICK_HZ)
-    assert {label: pytest.approx(times) for label, times in passed.items()} == found
+    file = read_file(TimerFile(path))
+    changes, names = file.changes[~file.changes["first"]], [*file.names]
+    ticks = changes["tick"].tolist()
+    origin = min(ticks) - round(FALL[0] * TICK_HZ)  # of a date it is far away
+    labels = [names[label] for label in changes["label"]]
+    states = [signals.STATES[state] for state in changes["state"]]
+    assert {*labels} == {*passed}
     for label, times in passed.items():
-        said = [one.state for one in run if one.label == label]
+        own = [label == other for other in labels]
+        found = [(tick - origin) / TICK_HZ for tick in compress(ticks, own)]
+        assert found == pytest.approx(times)
+        said = [*compress(states, own)]
         assert said in ([""] * len(times), ["blocked", "clear"] * (len(times) // 2)) or set(
             said
         ) == {"high", "low"}
