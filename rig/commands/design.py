@@ -1,6 +1,5 @@
 """``rig design``."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -12,15 +11,11 @@ from rig.design.rewriting import rewrite_heights
 from rig.design.search import better, room
 from rig.design.trials import readable, trials, trials_text
 from rig.files import write_atomic
-from rig.measurands import MEASURANDS
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_measurable
 from rig.protocol.protocol import Protocol
 from rig.reasons import rig_error
-from rig.report.estimate import symbol
-from rig.report.numbers import decimals_for, fixed
-from rig.report.templates import sentence
-from rig.text_table import text_table
+from rig.report.design import design_lines
 
 
 def main(arguments: Arguments) -> None:
@@ -90,27 +85,4 @@ def _forecast(protocol: Protocol, components: Components) -> dict[str, Any]:
             {"name": name, "u": u, "identified": name not in expected.held}
             for name, u in expected.coefficients.items()
         ],
-    }
-
-
-def design_lines(design: Mapping[str, Any]) -> list[str]:
-    """Write layouts and their uncertainties, for a terminal."""
-    layouts = {name: design[name] for name in ("current", "proposed") if name in design}
-    cells = [_uncertainties(layout) for layout in layouts.values()]
-    rows = [[name, *(column[name] for column in cells)] for name in cells[0]]
-    table = text_table([["quantity", *layouts], *rows], left={0}, rule=True)
-    return sentence("design", design, table).split("\n")
-
-
-def _uncertainties(layout: Mapping[str, Any]) -> dict[str, str]:
-    """Write the standard uncertainty of each quantity of one run, and of each coefficient."""
-    runs = [(MEASURANDS[line["name"]], line["u_run"]) for line in layout["measurands"]]
-    u = {f"{row.symbol} of one run ({row.fine})": u * row.fine_scale for row, u in runs if row.told}
-    u |= {
-        symbol(line["name"]): line["u"] if line["identified"] else None
-        for line in layout["coefficients"]
-    }
-    return {
-        name: "not identified" if value is None else fixed(value, decimals_for(value))
-        for name, value in u.items()
     }

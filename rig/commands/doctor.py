@@ -42,10 +42,9 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
         yield from _board(url)
     elif url:
         yield Finding("board", "its port cannot be used now", Verdict.NOT_POSSIBLE)
-    folder = Path(session or "").parent
     yield make_check("packages", computer.check_packages, "chainrig")
     yield make_check("kept results", computer.describe_cache, CacheFile())
-    yield make_check("disk", computer.check_room, folder)
+    yield make_check("disk", computer.check_room, Path(session or "").parent)
     if session:
         yield from check_session(session)
 

@@ -9,7 +9,6 @@ from rig.commands.output import Arguments, goes_on, say, stage
 from rig.files import replacing
 from rig.protocol import reader
 from rig.protocol.protocol import Protocol
-from rig.reasons import rig_error
 from rig.report.canvas import ENDINGS, write_figure
 from rig.report.templates import sentence
 from rig.sweep.compute import NO_ANSWER, PILE, Swept, chunk_length, compute
@@ -24,14 +23,12 @@ def main(arguments: Arguments) -> None:
     protocol = reader.read(arguments.protocol)
     layout = lay_out(protocol, arguments.vary)
     if output.suffix in ENDINGS:  # found out now, not after a long computation
-        import_module("matplotlib")
-        _check_drawable(layout)
+        import_module("rig.report.sweep").check_drawable(layout)
     with goes_on("nothing was written"):
         swept = _compute(layout, arguments.jobs, arguments.cluster)
         _write(output, protocol, layout, swept)
-    beyond, notes = ~swept.in_domain, swept.notes
-    counts = (points.sum() for points in (beyond, notes & NO_ANSWER > 0, notes & PILE > 0))
-    say(f"{output}: {sentence('swept', notes.size, *counts)}")
+    masks = ~swept.in_domain, swept.notes & NO_ANSWER > 0, swept.notes & PILE > 0
+    say(f"{output}: {sentence('swept', layout.size, *(points.sum() for points in masks))}")
 
 
 def _compute(layout: Layout, jobs: int | None, address: str | None) -> Swept:
@@ -70,12 +67,3 @@ def _write(output: Path, protocol: Protocol, layout: Layout, swept: Swept) -> No
             write_npz(stream, facts, protocol.text, layout, swept)
         else:
             write_csv(stream, facts, layout, swept)
-
-
-def _check_drawable(layout: Layout) -> None:
-    if layout.layered:
-        *first, last = (f"{value:g}" for value in layout.values["incline"])
-        inclines = ", ".join([*first, last])
-        raise rig_error("sweep_of_inclines", inclines=inclines, last=last)
-    if len(layout.axes) > 2:
-        raise rig_error("sweep_of_axes", axes=len(layout.axes))

@@ -46,8 +46,7 @@ async def _show(app: RigApp) -> None:
 
 
 def _options(arguments: Arguments) -> Options:
-    folders = Path("protocols"), Path()
-    files = [path for folder in folders for path in sorted(folder.glob("[!.]*.yaml"))]
+    files = [*sorted(Path("protocols").glob("[!.]*.yaml")), *sorted(Path().glob("[!.]*.yaml"))]
     live = arguments.port or arguments.protocol or arguments.socket
     offline = bool(arguments.session) and not live
     if not offline:

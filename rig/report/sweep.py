@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.ticker import MaxNLocator
 
 from rig.measurands import SEPARATION, SPEED
+from rig.reasons import rig_error
 from rig.report.figure import WIDE_PT, Trace, chart
 from rig.report.looks import INK, MUTED
 from rig.report.templates import render
@@ -28,6 +29,22 @@ if TYPE_CHECKING:
 _LEVELS = 7
 _SPAN = 0.995
 """Share of the values within the levels: near a singular Eq. 13 speeds are unbounded."""
+
+
+def check_drawable(layout: Layout) -> None:
+    """Refuse a layout of which there is no figure.
+
+    Raises
+    ------
+    InputError
+        Inclines side by side, or more than two axes.
+    """
+    if layout.layered:
+        *first, last = (f"{value:g}" for value in layout.values["incline"])
+        inclines = ", ".join([*first, last])
+        raise rig_error("sweep_of_inclines", inclines=inclines, last=last)
+    if len(layout.axes) > 2:
+        raise rig_error("sweep_of_axes", axes=len(layout.axes))
 
 
 def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> Chart:
