@@ -5,10 +5,9 @@ from __future__ import annotations
 import csv
 from collections.abc import Container, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rig.bundle.archive import sha256
-from rig.clock.calibration import Calibration
 from rig.measurands import MEASURANDS
 from rig.reasons import sentences
 from rig.session.reading import Reader
@@ -16,6 +15,9 @@ from rig.session.schema import TABLES
 from rig.text_rows import read_rows
 from rig.text_table import csv_text
 from rig.timers.edge_rows import HEADER, edges_text
+
+if TYPE_CHECKING:  # tables are written without numpy
+    from rig.clock.calibration import Calibration
 
 _LISTS = ("budget", "causes", "gates")  # of objects, for which a cell has no room
 _EDGES = "edges.csv"

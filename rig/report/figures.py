@@ -7,17 +7,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby, pairwise
 from operator import attrgetter, itemgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
-from rig.analysis.session import Analysis
-from rig.analysis.summary import Incline
 from rig.measurands import RELEASE_SKEW, SEPARATION, SPEED, Measurand, acceleration_in, averaged
 from rig.protocol.protocol import Condition
 from rig.report.figure import Chart, chart
 from rig.report.looks import PARTS, REST
 from rig.report.numbers import fixed, value_of, with_unit
 from rig.report.parts import LABELS, Bars, means_of
+
+if TYPE_CHECKING:  # a figure is drawn where no drop is analysed
+    from rig.analysis.session import Analysis
+    from rig.analysis.summary import Incline
 
 Groups = list[dict[str, Any]]
 

@@ -11,7 +11,7 @@ from itertools import count
 import pytest
 from serial import SerialException
 
-from rig.analysis import identify as reading
+from rig.analysis import drop as reading
 from rig.reasons import Reason
 from rig.replay import replay
 from rig.runner import Operator, run_protocol
