@@ -59,6 +59,8 @@ class DropModel:
 
     Attributes
     ----------
+    condition
+        The same for drops that differ only in their edges.
     owners
         Suffixes of the names of shared unknowns, by owner, if the drops of a joint fit come from
         different rigs: see `rig.analysis.several`.
@@ -83,6 +85,7 @@ class DropModel:
         self.components: Components = components or priors(protocol)
         self.suspects: tuple[Unknown, ...] = ()
         self.owners: Mapping[str, str] = {}
+        self.condition: object = object()
         self.expected: dict[str, ExpectedEdges] = {
             role: ExpectedEdges.of(record, protocol) for role, record in self.records.items()
         }
@@ -380,7 +383,9 @@ class _Condition:
 @lru_cache(maxsize=64)
 def _model_of(condition: _Condition) -> DropModel:
     protocol, records = condition.protocol, condition.records
-    return DropModel(protocol, records, _stated_guesses(protocol, records), 0.0)
+    model = DropModel(protocol, records, _stated_guesses(protocol, records), 0.0)
+    model.condition = condition
+    return model
 
 
 def _expectations(record: ChainRecord) -> tuple[object, ...]:

@@ -117,7 +117,7 @@ def group_drops(fits: Sequence[DropFit], shared: SharedUnknowns) -> list[DropGro
     for n, model in enumerate(fit.model for fit in fits):
         rig, owners = model.owners.get("rig"), tuple(sorted(model.owners.items()))
         clock_u[rig] = max(model.clock_u, clock_u.get(rig, 0.0))
-        alike.setdefault((id(model.slopes), owners), []).append(n)
+        alike.setdefault((model.condition, owners), []).append(n)
     groups = []
     for numbers in alike.values():
         first = fits[numbers[0]].model
@@ -137,14 +137,14 @@ def group_drops(fits: Sequence[DropFit], shared: SharedUnknowns) -> list[DropGro
 
 def with_priors(groups: Sequence[DropGroup], components: Components) -> list[DropGroup]:
     """Return drops with other priors; those of impulses are relative to a condition's mean α."""
-    alphas: dict[int, list[Array]] = {}
+    alphas: dict[object, list[Array]] = {}
     for group in groups:
         if "impact" in group.model.guesses:
-            alphas.setdefault(id(group.model.slopes), []).append(group.model.alphas(group.x))
+            alphas.setdefault(group.model.condition, []).append(group.model.alphas(group.x))
     changed = []
     for group in groups:
         guesses = dict(group.model.guesses)
-        if of_condition := alphas.get(id(group.model.slopes)):
+        if of_condition := alphas.get(group.model.condition):
             mean = float(np.concatenate(of_condition).mean())
             guesses["impact"] = guesses["impact"]._replace(alpha=mean)
         model, x = group.model.copy_with(components=components, guesses=guesses), group.x.copy()
@@ -154,12 +154,13 @@ def with_priors(groups: Sequence[DropGroup], components: Components) -> list[Dro
 
 
 def _edges(model: DropModel, drops: Sequence[DropFit]) -> dict[str, Seen]:
+    pairings = [model.with_edges(drop.model.records).pairings for drop in drops]
     edges = {}
     for role, expected in model.expected.items():
         times = np.empty((len(drops), expected.rods.size))
         burst = np.full(times.shape, np.inf)
         for n, drop in enumerate(drops):
-            pairing = model.with_edges(drop.model.records).pairings[role]
+            pairing = pairings[n][role]
             pick, edge = matched(drop.matches[role])
             # Any moment after the release: at rest, a chain has no uncertainty.
             some_time = drop.model.guesses[role].release + 1.0

@@ -6,7 +6,6 @@ from rig.commands.output import Arguments
 from rig.files import read_input
 from rig.reasons import plain_reason, rig_error
 from rig.report.numbers import ranges
-from rig.results import kept_back, protocol_of
 from rig.session.store import Session
 from rig.wordings import NOTE
 
@@ -43,6 +42,8 @@ def attach(arguments: Arguments) -> None:
 
 def unblind(arguments: Arguments) -> None:
     """Record that a blind session's numbers may be seen from now on."""
+    from rig.results import kept_back, protocol_of  # noqa: PLC0415 - notes and files need no numpy
+
     with Session.open(arguments.session) as session:
         if not kept_back(session, protocol_of(session)):
             when = f"since {session.unblinded}" if session.unblinded else "and never was blind"

@@ -241,8 +241,8 @@ def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
     """Return how changes may be put into runs; those of rows first where times begin anew."""
     groups = ["runs", *["unsorted"] * file.is_stacked]
     if file.is_wide:
-        groups += ["rows", "columns"]
-        groups = groups[:: -1 if np.any(np.diff(file.changes["tick"]) < 0) else 1]
+        is_anew = np.any(np.diff(file.changes["tick"]) < 0)
+        groups = ["rows", "columns", *groups] if is_anew else [*groups, "rows", "columns"]
     is_wire = len(file.labels) < 2 and bars == 1 and len(gates) > 1
     return groups + ["passing"] * is_wire
 

@@ -26,8 +26,6 @@ _COLUMN_ROLES = {
 }
 _UNFILLED = {"setting", "index", "derived"}
 """Roles of columns that may have a name and no values: a rate, comments, or distances."""
-_UNFILLED = {"setting", "index", "derived"}
-"""Roles of columns that may have a name and no values: a rate, comments, or distances."""
 _PREFIXES = {"k": 3, "m": 6, "g": 9}
 _JUDGED = 100
 """Lines in which values are counted."""
@@ -197,7 +195,7 @@ class Table:
             values = dict(_named_values(line))
             return [values.get(name, "") for name in self._names] if any(values) else [line]
         cells = split_cells(line, self.separator, len(self._usual))
-        if form("plain row").fullmatch(line) and "," not in line:  # as most
+        if form("plain row").fullmatch(line) and "," not in line and "--" not in line:  # as most
             return cells
         missing, has_comma = vocabulary.words()["missing"], form("decimal comma").fullmatch
         cells = ["" if text[:5].casefold() in missing else text for text in cells]
@@ -208,6 +206,8 @@ class Table:
         block, is_plain = RowBlock(self.remarks, []), form("plain row").fullmatch
         block.headings += [Row(0, self._names, "", block)] if not self.separator else []
         for number, line in self._lines:
+            if not line.strip():
+                continue
             if block.width and is_plain(line):  # as most
                 yield Row(number, self.split(line), line, block)
                 continue

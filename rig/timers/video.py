@@ -39,21 +39,26 @@ def read_video(path: str | Path) -> VideoTrack:
     """
     problems = ProblemList(str(path), make_reason("video_files").text)
     rows = list(Table(enumerate(read_lines(path), 1)).rows())
+    rows = [row for row in rows if row.block is rows[0].block]  # of the first object
     above = rows[0].block.headings if rows else []
     heading = next((row for row in above[::-1] if len(_find_axes(row)) == len(_SCALES)), None)
     if heading is None:
         problems.refuse(1, 1, "no_track")
-    columns = []
-    for name, (n, unit) in sorted(_find_axes(heading).items()):
+    axes = sorted(_find_axes(heading).items())
+    for name, (n, unit) in axes:
         if unit not in _SCALES[name]:
             accepted = f"a unit of this column: {', '.join(filter(None, _SCALES[name]))}"
             problems.reject(*heading.place(n), heading.cell(n), unit, accepted)
         for row in rows:
             if (text := row.cell(n)) and not is_number(text):
                 problems.reject(*row.place(n), name, text, "a number")
-        problems.raise_if_any()
-        columns.append([float(row.cell(n) or "nan") * _SCALES[name][unit] for row in rows])
-    places = np.array(columns)
+    problems.raise_if_any()
+    places = np.array(
+        [
+            [float(row.cell(n) or "nan") * _SCALES[name][unit] for row in rows]
+            for name, (n, unit) in axes
+        ]
+    )
     track = VideoTrack(*places[:, ~np.isnan(places).any(axis=0)])
     if track.times.size < FEWEST or not np.all(np.diff(track.times) > 0):
         problems.refuse(1, 1, "few_frames", frames=track.times.size, needed=FEWEST)

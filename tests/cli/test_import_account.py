@@ -8,6 +8,7 @@ import pytest
 from rig.errors import InputError
 from rig.timers.timer_file import TimerFile, read_file
 from tests.cli.lab import PROTOCOLS
+from tests.tables import cases
 from tests.timers.shapes import RUNS, shapes
 
 BALL = PROTOCOLS / "falling-ball.yaml"
@@ -62,12 +63,6 @@ def test_a_gate_that_the_file_lacks_is_said(look):
     assert "the file has nothing of the gates at channels 2" in done.err
 
 
-def test_a_single_edge_bears_nothing_out(look):
-    done = look("Time [s],Channel 0\n0.0,1\n0.4206,0\n0.9,0\n")
-    assert done.code == 2
-    assert "at most 50 % of its edges" in done.err
-
-
 def test_more_edges_than_the_object_makes_are_refused(look):
     content = HEAD + rows((t, 1, d) for t, _, d in RUNS[0])
     assert look(content).code == 2
@@ -89,11 +84,10 @@ def test_two_wires_at_one_stamp_of_a_dump_are_refused(look):
     assert "inputs change at the same time, line 1" in done.err
 
 
-def test_what_no_fall_decides_is_asked_with_the_line_to_add(look):
-    content = "time (s)\n0.1\n0.2\n0.35\n0.9\n"
-    done = look(content)
-    assert done.code == 2
-    assert "--map 'dark=" in done.err
+@cases
+def test_what_is_said_of_a_file(look, content, options, code, said):
+    done = look(content, *options)
+    assert (done.code, said in done.out + done.err) == (code, True), done.err
 
 
 @pytest.mark.parametrize(

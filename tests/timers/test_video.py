@@ -51,6 +51,8 @@ def test_frames_of_something_else_than_a_fall_are_noticed():
         ("run,channel,time_s,state\n1,0,0.1,1\n", "no columns t, x and y"),
         ("t,x,y\n0,1,2\n", "1 frames"),
         ("t,x,y\n0,1,2\n0.1,a,2\n", ":3:5: x: 'a' is not a number"),
+        ("t,x,y\n0,1,2\n0.1,a,b\n", ":3:7: y: 'b' is not a number"),
+        ("t,x,y\n0,1,2\n0.1,1,2\nt,x,y\n0.2,1,2\n", "2 frames"),
         ("t (s),x (px),y (px)\n0,1,2\n0.1,1,2\n", "'px' is not a unit of this column"),
     ],
 )
