@@ -249,7 +249,7 @@ def _average(groups: Sequence[DropGroup], size: int) -> Array:
     total, count = np.zeros(size), np.zeros(size)
     for group in groups:
         total[group.here] += group.x[:, group.common].sum(axis=0)
-        count[group.here] += len(group.drops)
+        count[group.here] += len(group.x)
     return total / count
 
 

@@ -11,10 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from rig.analysis.annealing import matched
+from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import Components
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY, Seen, linearize, standardise
-from rig.analysis.fit import DropFit, match
+from rig.analysis.fit import DropFit, Matches, match
 from rig.analysis.square_root import (
     Elimination,
     EquationRows,
@@ -60,8 +61,8 @@ class DropGroup:
         Places of the drops in the session.
     model
         Of all of them; its edges are those of any drop.
-    drops
-        Each with its edges and matches.
+    records, matches
+        Chains of each drop, and its matches, by role.
     edges
         Matched edges by role, shape ``(drops, expected)``; where none is matched, a time that is
         infinitely uncertain.
@@ -73,7 +74,8 @@ class DropGroup:
 
     places: Sequence[int]
     model: DropModel
-    drops: Sequence[DropFit]
+    records: Sequence[Mapping[str, ChainRecord]]
+    matches: Sequence[Matches]
     edges: Mapping[str, Seen]
     x: Array
     own: Index
@@ -95,18 +97,16 @@ class DropGroup:
 
     def rematch(self) -> DropGroup:
         """Return the drops with their edges matched anew."""
-        drops = []
-        for drop, x in zip(self.drops, self.x, strict=True):
-            model = self.model.with_edges(drop.model.records)
-            drops.append(DropFit(model, match(model, x), x))
-        return replace(self, drops=drops, edges=_edges(self.model, drops))
+        models = [self.model.with_edges(records) for records in self.records]
+        matches = [match(model, x) for model, x in zip(models, self.x, strict=True)]
+        return replace(self, matches=matches, edges=_edges(models, matches, self.x))
 
     def split(self, reduced: Elimination) -> Iterator[JointDrop]:
         """Yield each drop, with its own unknowns eliminated."""
         places = self.own, self.common, self.here
-        for drop, x, inverse, gain in zip(self.drops, self.x, *reduced[:2], strict=True):
-            model = self.model.with_edges(drop.model.records)
-            yield JointDrop(model, drop.matches, x, *places, inverse, gain)
+        drops = zip(self.records, self.matches, self.x, *reduced[:2], strict=True)
+        for records, matches, x, inverse, gain in drops:
+            yield JointDrop(self.model.with_edges(records), matches, x, *places, inverse, gain)
 
 
 def group_drops(fits: Sequence[DropFit], shared: SharedUnknowns) -> list[DropGroup]:
@@ -130,8 +130,11 @@ def group_drops(fits: Sequence[DropFit], shared: SharedUnknowns) -> list[DropGro
             x = np.array([drop.x for drop in drops])
             for row, drop in zip(x, drops, strict=True):
                 model.refer(row, drop.model.guesses)
-            edges = _edges(model, drops)
-            groups.append(DropGroup(places, model, drops, edges, x, own, common, here))
+            records = [drop.model.records for drop in drops]
+            matches = [drop.matches for drop in drops]
+            edges = _edges([model.with_edges(each) for each in records], matches, x)
+            about = places, model, records, matches
+            groups.append(DropGroup(*about, edges, x, own, common, here))
     return groups
 
 
@@ -153,18 +156,17 @@ def with_priors(groups: Sequence[DropGroup], components: Components) -> list[Dro
     return changed
 
 
-def _edges(model: DropModel, drops: Sequence[DropFit]) -> dict[str, Seen]:
-    pairings = [model.with_edges(drop.model.records).pairings for drop in drops]
-    edges = {}
-    for role, expected in model.expected.items():
-        times = np.empty((len(drops), expected.rods.size))
+def _edges(models: Sequence[DropModel], matches: Sequence[Matches], x: Array) -> dict[str, Seen]:
+    edges, at = {}, models[0].unknowns
+    for role, expected in models[0].expected.items():
+        times = np.empty((len(models), expected.rods.size))
         burst = np.full(times.shape, np.inf)
-        for n, drop in enumerate(drops):
-            pairing = pairings[n][role]
-            pick, edge = matched(drop.matches[role])
-            # Any moment after the release: at rest, a chain has no uncertainty.
-            some_time = drop.model.guesses[role].release + 1.0
-            times[n] = pairing.times[edge].max() if edge.size else some_time
+        # Any moment after the release: at rest, a chain has no uncertainty.
+        fallen = x[:, at[f"{role} release"]] + models[0].guesses[role].release + 1.0
+        for n, model in enumerate(models):
+            pairing = model.pairings[role]
+            pick, edge = matched(matches[n][role])
+            times[n] = pairing.times[edge].max() if edge.size else fallen[n]
             times[n, pick], burst[n, pick] = pairing.times[edge], pairing.burst[edge]
         edges[role] = expected.seen(np.arange(expected.rods.size), times, burst)
     return edges

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.plain_data import attributes, plain
-from rig.errors import InputError
-from rig.reasons import Reason, make_error, reasons_json
+from rig.reasons import Reason, reasons_json, rig_error
 
 if TYPE_CHECKING:  # results are shown, and predictions made, where no drop is analysed
     import numpy as np
@@ -40,7 +39,7 @@ def optional_package(name: str) -> Any:
     try:
         return import_module(name)
     except ModuleNotFoundError as error:
-        raise make_error(InputError, "package_absent", package=name) from error
+        raise rig_error("package_absent", package=name) from error
 
 
 class Deviation(NamedTuple):

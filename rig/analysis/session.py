@@ -21,11 +21,10 @@ from rig.analysis.result import GOOD, DropResult
 from rig.analysis.summary import Incline, summarize
 from rig.analysis.verdict import nearly_in_time, release_reasons, verdict_of
 from rig.clock.calibration import TimeScale
-from rig.errors import InputError
 from rig.protocol.measurable import check_gates, check_measurable
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Protocol, Run
-from rig.reasons import Reason, make_error, make_reason
+from rig.reasons import Reason, make_reason, rig_error
 from rig.records import Drop
 from rig.threads import one_thread
 
@@ -205,8 +204,8 @@ def planned_run(planned: Mapping[int, Run], drop: Drop) -> Run:
     """
     if drop.run not in planned:
         if drop.damage:  # the damage may be in its number
-            raise make_error(InputError, "record_damaged", text=f"run {drop.run}: {drop.damage}")
-        raise make_error(InputError, "run_not_planned", run=drop.run, planned=len(planned))
+            raise rig_error("record_damaged", text=f"run {drop.run}: {drop.damage}")
+        raise rig_error("run_not_planned", run=drop.run, planned=len(planned))
     return planned[drop.run]
 
 

@@ -16,9 +16,8 @@ from rig.analysis.joint_step import JointDrop
 from rig.analysis.result import DropResult, Measured
 from rig.analysis.session import Analysis, fit_together, sum_up
 from rig.analysis.summary import Incline, summarize
-from rig.errors import InputError
 from rig.protocol.protocol import Protocol
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.threads import one_thread
 
 Key = tuple[int, tuple[int, int]]
@@ -127,7 +126,7 @@ def fit_sessions(parts: Sequence[SessionPart], *, same_rig: bool | None = None) 
     kinds = [(part.protocol.vocabulary.scene, priors(part.protocol)) for part in parts]
     for part, kind in zip(parts, kinds, strict=True):
         if kind != kinds[0]:
-            raise make_error(InputError, "sessions_unlike", path=part.name, other=first.name)
+            raise rig_error("sessions_unlike", path=part.name, other=first.name)
     shared = same_owners(parts, same_rig=same_rig)
     drops = _own(parts, shared)
     together = fit_together(
@@ -142,7 +141,7 @@ def fit_sessions(parts: Sequence[SessionPart], *, same_rig: bool | None = None) 
     )
     if not together.settled:
         names = ", ".join(part.name for part in parts)
-        raise make_error(InputError, "sessions_disagree", names=names)
+        raise rig_error("sessions_disagree", names=names)
     results: list[list[DropResult]] = [[] for _ in parts]
     for (place, _), result in together.results.items():
         results[place].append(result)

@@ -12,10 +12,9 @@ from dataclasses import replace
 
 from rig.analysis.result import DropResult
 from rig.analysis.session import Analysis
-from rig.errors import SessionError
 from rig.measurands import RELEASE_SKEW
 from rig.protocol.protocol import Protocol
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.session.reading import Reader
 
 
@@ -33,7 +32,7 @@ def check_open(session: Reader, protocol: Protocol) -> None:
         The session is blind.
     """
     if kept_back(session, protocol):
-        raise make_error(SessionError, "session_blind", path=str(session.path))
+        raise rig_error("session_blind", path=str(session.path))
 
 
 def veiled_drop(result: DropResult) -> DropResult:

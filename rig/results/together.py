@@ -16,11 +16,10 @@ from rig.analysis.result import GOOD, DropResult, Measured
 from rig.analysis.session import Analysis, Progress
 from rig.analysis.several import SessionPart, SessionsFit, fit_sessions
 from rig.analysis.summary import Incline, good_cases
-from rig.errors import InputError
 from rig.measurands import averaged
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Condition
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.results.blind import check_open
 from rig.results.whole import SessionResults, complete_analysis, protocol_of, results
 from rig.session.reading import Reader
@@ -157,7 +156,7 @@ class TogetherResults:
                         difference = combine(values, (1.0, -1.0))
                         differences.append(MeanDifference(*names, condition, difference))
         if not differences:
-            raise make_error(InputError, "nothing_to_compare", path=first.name)
+            raise rig_error("nothing_to_compare", path=first.name)
         return differences
 
 
@@ -224,17 +223,17 @@ def _check_repeats(files: Sequence[Reader], own: Sequence[SessionResults]) -> No
         # With few edges and a coarse timer, single drops may be equal by chance.
         if common and common == min(len(edges), len(rest)):
             values = {"path": other_path, "other": path, "drops": common}
-            raise make_error(InputError, "session_repeated", **values)
+            raise rig_error("session_repeated", **values)
 
 
 def _check_whole(path: str, analysis: Analysis, planned: int, *, unfinished: bool) -> None:
     """Raise an error for a session that is damaged, or lacks runs."""
     if analysis.damaged:
         records = "; ".join(analysis.damage)
-        raise make_error(InputError, "records_damaged", path=path, records=records)
+        raise rig_error("records_damaged", path=path, records=records)
     missing = planned - len(analysis.runs)
     if missing and not unfinished:
         counts = {"missing": missing, "planned": planned}
-        raise make_error(InputError, "session_unfinished", path=path, **counts)
+        raise rig_error("session_unfinished", path=path, **counts)
     if not any(run.verdict in GOOD for run in analysis.runs):
-        raise make_error(InputError, "session_no_results", path=path)
+        raise rig_error("session_no_results", path=path)
