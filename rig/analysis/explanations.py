@@ -169,7 +169,7 @@ class Explainer:
             return
         scales = self.components
         wider = replace(scales, stretch=_BEYOND * scales.stretch, landed=_BEYOND * scales.landed)
-        reading = weigh(settle(fit.model.copy_with(components=wider), x=fit.x.copy()))
+        reading = weigh(settle(fit.model.copy_with(components=wider), fit.x.copy()))
         log_odds = self._absolute(reading, self.setting.hz) - CLEAR - stated
         yield Explanation(NEITHER, {}, log_odds, whole=True)
 
@@ -276,7 +276,7 @@ class Explainer:
         (score,) = scores(fit, [fault.shift.direction(fit.model)])
         largest, model = max(fault.sizes), fit.model.copy_with(suspects=(fault.suspect(fit.model),))
         first = float(np.clip(score.size, -largest, largest)) * np.append(score.follow, 1.0)
-        reading = weigh(settle(model, x=np.append(fit.x, 0.0) + first))
+        reading = weigh(settle(model, np.append(fit.x, 0.0) + first))
         estimate = reading.fit.estimate
         further, u = float(estimate.x[-1]), float(estimate.own_u[-1])
         if APART * u < abs(size + further) <= largest:
