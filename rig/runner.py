@@ -11,7 +11,7 @@ from typing import NamedTuple
 from rig.analysis.result import DropResult
 from rig.campaign import machine
 from rig.campaign.machine import Effect, Event, Flow, Stage, step
-from rig.campaign.plan import describe_setup, job_to_judge, next_job, plan_lines, rest_s
+from rig.campaign.plan import describe_setup, job_to_judge, next_job, rest_s
 from rig.campaign.voids import voids_of
 from rig.daemon.client import Client
 from rig.daemon.connecting import connect
@@ -22,6 +22,7 @@ from rig.protocol.measurable import check_gates, check_recordable
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
 from rig.recorder.interrupts import Interrupts
+from rig.recorder.run_lines import plan_lines
 from rig.records import Drop, Job
 from rig.report.templates import sentence
 from rig.results import SessionResults, results

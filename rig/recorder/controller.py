@@ -19,7 +19,7 @@ from rig.reasons import Reason, error_of, make_error, make_reason, plain_reason,
 from rig.recorder import release_test
 from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
 from rig.recorder.interrupts import StoppedError
-from rig.recorder.opening import describe_session, latest_board, latest_states, open_for
+from rig.recorder.opening import describe_session, latest_board, open_for
 from rig.recorder.published import PublishedState, link_state
 from rig.recorder.recorder import NullSink, Recorder
 from rig.records import Drop
@@ -243,7 +243,7 @@ class Controller:
 
     def _without_drop(self, *states: RunState) -> list[tuple[int, int]]:
         """List the attempts that are logged last in one of these states, with no drop stored."""
-        latest = latest_states(self.session).values()
+        latest = {entry.run: entry for entry in self.session.states()}.values()
         jobs = [(entry.run, entry.attempt) for entry in latest if entry.state in states]
         return [job for job in jobs if self.session.drop(*job) is None]
 

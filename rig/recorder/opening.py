@@ -8,8 +8,9 @@ from typing import Any
 from rig.ports import is_simulated, truth_file
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
-from rig.reasons import Reason, reasons_json, rig_error
-from rig.session.reading import Reader, StateEntry
+from rig.reasons import rig_error
+from rig.recorder.run_lines import plan_lines
+from rig.session.reading import Reader
 from rig.session.store import Session
 
 
@@ -47,30 +48,11 @@ def latest_board(session: Reader) -> dict[str, str]:
     return {name: str(value) for name, value in boards[-1].items()} if boards else {}
 
 
-def latest_states(session: Reader) -> dict[int, StateEntry]:
-    """Return where each run stands that the log names."""
-    return {entry.run: entry for entry in session.states()}
-
-
 def describe_session(
     session: Reader, protocol: Protocol
 ) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Describe a session and its plan as the sections ``session`` and ``runs`` of the state do."""
-    latest = latest_states(session)
-    plan = []
-    for run in runs(protocol):
-        entry = latest.get(run.number)
-        plan.append(
-            {
-                "run": run.number,
-                "incline_deg": run.incline_deg,
-                "impact": run.impact,
-                "free": run.free,
-                "attempt": entry.attempt if entry else 0,
-                "state": str(entry.state) if entry else "planned",
-                **reasons_json(entry.reasons if entry else (), Reason.record),
-            }
-        )
+    plan = [line.json() for line in plan_lines(runs(protocol), session.states())]
     about = {
         "path": str(session.path),
         "source": session.protocol_source,

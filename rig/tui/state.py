@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from rig.campaign.plan import RunLine, plan_lines
-from rig.reasons import read_record
+from rig.recorder.run_lines import RunLine, plan_lines, read_line
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -91,21 +90,8 @@ def read_state(n: int, state: Mapping[str, Any]) -> DaemonState:
         Sections by name. Entries of its lists are replaced by the replica, never changed.
     """
     sections = {name: value for name, value in state.items() if name not in {"runs", "edges"}}
-    return DaemonState(
-        n, sections, tuple(map(_line, state.get("runs") or ())), tuple(state.get("edges") or ())
-    )
-
-
-def _line(run: Mapping[str, Any]) -> RunLine:
-    return RunLine(
-        run["run"],
-        float(run["incline_deg"]),
-        run["impact"],
-        run["free"],
-        run["attempt"],
-        run["state"],
-        tuple(map(read_record, run["reason_codes"] or ())),
-    )
+    runs, edges = map(read_line, state.get("runs") or ()), state.get("edges") or ()
+    return DaemonState(n, sections, tuple(runs), tuple(edges))
 
 
 def state_of(view: SessionView) -> DaemonState:
