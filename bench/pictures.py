@@ -88,6 +88,11 @@ class FakeClient(ReconnectingClient):
         """The one it was given."""
         return self._state
 
+    @property
+    def connection(self) -> Any:
+        """Itself: nobody is asked."""
+        return self
+
     async def call(self, method: str, **params: Any) -> Any:
         """Never answer."""
         del method, params

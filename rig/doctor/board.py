@@ -14,7 +14,7 @@ from rig.flash.boards import UNSEEN
 from rig.flash.image import shipped_firmware
 from rig.link.messages import RefusalReason
 from rig.link.refusals import DeviceRefusedError
-from rig.reasons import make_error
+from rig.reasons import error_of, make_reason
 from rig.selftest import checks, line_checks
 from rig.selftest.board import BoardUnderTest, Check, RecordedDrop
 from rig.selftest.findings import fail_if, need
@@ -80,7 +80,7 @@ def _record(board: BoardUnderTest) -> RecordedDrop:
         else:
             return board.collect_drop()
     listed = "too often to begin a recording"
-    raise make_error(DeviceError, "gates_flicker", gates_listed=listed)
+    raise error_of(DeviceError, make_reason("gates_flicker", gates_listed=listed))
 
 
 def mains_ripple(times_s: Sequence[float]) -> int | None:

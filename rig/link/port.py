@@ -12,9 +12,9 @@ import serial
 from serial.urlhandler import protocol_socket
 
 from rig.clock.host import Clock, SystemClock
-from rig.errors import DeviceError, RigError
+from rig.errors import RigError
 from rig.ports import check_name, simulation_package
-from rig.reasons import make_error, rig_error
+from rig.reasons import rig_error
 
 BAUDRATE = 500_000
 """Exact from 16 MHz (UBRR 3 with U2X); 115200 would be 2.1 % off."""
@@ -86,7 +86,7 @@ def open_port(url: str) -> Port:
         below = error.__context__.args[:1] if error.__context__ else ()
         number = error.errno or next((code for code in below if isinstance(code, int)), 0)
         code, text = _CODES.get(number, "port_failed"), _PLAIN.get(number, str(error))
-        raise make_error(DeviceError, code, port=url, text=text) from error
+        raise rig_error(code, port=url, text=text) from error
     except ValueError as error:
         if scheme == "emu":  # pyserial says no more of a handler it cannot import
             raise rig_error("emulator_missing") from error

@@ -6,13 +6,7 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from rig.errors import DeviceError
-
 _PATIENCE = 3
-
-
-class StoppedError(DeviceError):
-    """A client pressed STOP, or the one in control was lost."""
 
 
 class Interrupts:

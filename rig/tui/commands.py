@@ -162,12 +162,10 @@ def _control(app: RigApp) -> Work:
 
 def _close(app: RigApp) -> None:
     """Ask, then close the session, so that another can be chosen."""
-    client = app.client
-    assert client is not None
 
     def close() -> Work:
         app.driver.asked = None
-        return client.call("close_session")
+        return _ask(app, "close_session")
 
     question = "Everything recorded stays in its file. You can continue it later."
     _confirm(app, "Close the session?", question, "close", close)
@@ -183,6 +181,12 @@ def _quit(app: RigApp) -> None:
 
 def _confirm(app: RigApp, title: str, question: str, yes: str, act: Callable[[], Work]) -> None:
     app.ask(Confirm(title, question, yes), lambda _: act())
+
+
+async def _ask(app: RigApp, method: str) -> None:
+    """Ask the daemon for something; see rig/daemon/API.md."""
+    assert app.client is not None
+    await app.client.connection.call(method)
 
 
 def _try_release(app: RigApp) -> None:
@@ -320,13 +324,11 @@ def _repeat(app: RigApp) -> None:
 
 def _unblind(app: RigApp) -> None:
     """Ask, then unblind the session."""
-    client = app.client
-    assert client is not None
     if not app.model.blind:
         app.driver.take(Notice("this session is not blind\nwrite blind: true in its protocol"))
         return
     question = "This shows all results. It is recorded and cannot be undone."
-    _confirm(app, "Unblind the session?", question, "show results", partial(client.call, "unblind"))
+    _confirm(app, "Unblind the session?", question, "show results", lambda: _ask(app, "unblind"))
 
 
 def _begin_check(app: RigApp) -> None:

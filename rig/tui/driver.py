@@ -71,7 +71,8 @@ class Driver:
     async def open_session(self, protocol: str, session: str, seed: int | None) -> None:
         """Open a session in the daemon, now and after each restart."""
         assert self._client is not None
-        await self._client.call("open_session", protocol=protocol, session=session, seed=seed)
+        names = {"protocol": protocol, "session": session, "seed": seed}
+        await self._client.connection.call("open_session", **names)
         self.asked = protocol, session
 
     async def _carry_out(self, effect: Effect, ticket: int) -> None:
@@ -87,19 +88,19 @@ class Driver:
                     await self._switch_off(client, reason)
                     return
                 case campaign.Wait(seconds):
-                    await client.call("wait", seconds=seconds)
+                    await client.connection.call("wait", seconds=seconds)
                 case campaign.ArmRelease(job):
-                    answer = await client.call("arm", **job._asdict())
+                    answer = await client.connection.call("arm", **job._asdict())
                     token = int(answer["token"])
                 case campaign.FireRelease(armed):
-                    await client.call("fire", token=armed)
+                    await client.connection.call("fire", token=armed)
                 case campaign.Drive():
-                    await client.call("test_release")
+                    await client.connection.call("test_release")
                 case campaign.Collect(job):
-                    await client.call("collect", **job._asdict())
+                    await client.connection.call("collect", **job._asdict())
                 case campaign.Log(job, state, reasons):
-                    records = [reason.record() for reason in reasons]
-                    await client.call("log_state", **job._asdict(), state=state, reasons=records)
+                    verdict = {"state": state, "reasons": [reason.record() for reason in reasons]}
+                    await client.connection.call("log_state", **job._asdict(), **verdict)
                 case campaign.Judge(job):
                     result = (await self._follower.read()).results[job]
                     row = self._follower.voids.row
@@ -118,7 +119,7 @@ class Driver:
         asked, is_known = self.stop, False
         while not is_known and asked is self.stop:
             try:
-                await client.call("stop", reason=reason)
+                await client.connection.call("stop", reason=reason)
             except RigError as error:
                 heard, is_known = False, not isinstance(error, DeviceTimeoutError)
             else:

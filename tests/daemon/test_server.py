@@ -18,7 +18,7 @@ from rig.daemon import connection, rpc, service
 from rig.daemon.client import AsyncClient, Client, Line
 from rig.daemon.listener import Door
 from rig.daemon.socket_path import default_socket, prepare_folder
-from rig.errors import DeviceError, InputError, RigError
+from rig.errors import BusyError, DeviceError, InputError, RigError, VersionError
 from tests.tables import cases
 from tests.waiting import PATIENCE_S
 
@@ -84,7 +84,7 @@ async def test_a_client_of_another_version_is_told_so_and_sent_away(door):
         skewed = rpc.request("hello", {"api": rpc.API + 1, "client": "t"}, 1)
         answer, end = await told(path, skewed, HELLO)
         error = rpc.error_of(answer)
-        assert isinstance(error, rpc.VersionError)
+        assert isinstance(error, VersionError)
         assert "version 2 of the daemon's interface" in str(error)
         assert end is None
 
@@ -242,7 +242,7 @@ def test_many_at_once_are_all_answered_or_told_that_it_is_busy(daemon):
         def come(number):
             try:
                 crowd.callback(Client(Line(path, f"client {number}")).close)
-            except rpc.BusyError:
+            except BusyError:
                 return 0
             return 1
 
@@ -261,7 +261,7 @@ def test_a_door_at_which_nobody_ever_looks_is_not_waited_at_for_ever(tmp_path, m
         deaf.bind(str(path))
         deaf.listen(0)
         waiting.connect(str(path))  # the kernel keeps one waiting
-        with pytest.raises(rpc.BusyError, match="it took no new client"):
+        with pytest.raises(BusyError, match="it took no new client"):
             Client(Line(path, "one more"))
 
 
@@ -270,7 +270,7 @@ async def test_beyond_the_last_client_stop_is_done_and_nothing_else(door, monkey
 
     async with door() as (server, path):
         clients = [await AsyncClient.connect(path, f"client {n}") for n in range(3)]
-        with pytest.raises(rpc.BusyError, match="any further client may only stop"):
+        with pytest.raises(BusyError, match="any further client may only stop"):
             await clients[2].call("subscribe")
         assert await clients[2].call("stop") == {}
         await clients[0].close()

@@ -217,12 +217,12 @@ async def test_a_protocol_and_stop_are_clicked(lab, fence):
 
         await op.until(chosen)
         stopped = []
-        real = op.app.client.call
+        real = op.app.client.connection.call
 
         async def call(method, **params):
             stopped.append(method)
             return await real(method, **params)
 
-        op.app.client.call = call
+        op.app.client.connection.call = call
         await click(op, "app.do('stop')")
         await op.until(lambda: "stop" in stopped)
