@@ -217,9 +217,8 @@ def _falling(state: DaemonState, view: SessionView, job: Job) -> DaemonState:
     until = _LIVE_SHARE * drop.edges[-1].tick
     section = {"run": job.run, "attempt": job.attempt, "state": "fired", "tick_hz": drop.tick_hz}
     edges = tuple([*edge] for edge in drop.edges if edge.tick <= until)
-    return DaemonState(
-        0, {**state.sections, "drop": section, "phase": "recording"}, state.runs, edges
-    )
+    sections = {**state.sections, "drop": section, "phase": "recording"}
+    return DaemonState(sections, state.runs, edges)
 
 
 async def _looks(

@@ -148,8 +148,6 @@ class RecordedSession:
         SessionError
             If its stored record is damaged.
         """
-        import numpy as np  # noqa: PLC0415 - a door costs nothing before it is used
-
         recorded = [*self._file.drops()]
         drops = [drop for drop in recorded if drop.run == run and attempt in {None, drop.attempt}]
         if not drops:

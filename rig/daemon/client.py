@@ -324,10 +324,6 @@ class AsyncClient:
         """
         return await asyncio.wrap_future(self.line.ask(method, **params))
 
-    async def subscribe(self) -> None:
-        """Follow the state."""
-        await self.call("subscribe")
-
     async def close(self) -> None:
         """Hang up."""
         self.line.close()

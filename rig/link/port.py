@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import socket
 import warnings
+from pathlib import Path
 from typing import Any, Protocol
 from urllib.parse import urlsplit
 
@@ -13,7 +14,7 @@ from serial.urlhandler import protocol_socket
 
 from rig.clock.host import Clock, SystemClock
 from rig.errors import RigError
-from rig.ports import check_name, simulation_package
+from rig.ports import check_name
 from rig.reasons import rig_error
 
 BAUDRATE = 500_000
@@ -110,7 +111,9 @@ def check_url(url: str) -> None:
 
 
 def _add_handlers() -> None:
-    for package in (simulation_package(), "rig_emulator"):  # of sim:// and emu://
+    # Of sim:// and emu://; an installed simulation must not take the name ``sim``.
+    is_installed = (Path(__file__).parents[2] / "rig_sim").is_dir()
+    for package in ("rig_sim" if is_installed else "sim", "rig_emulator"):
         if package not in serial.protocol_handler_packages:
             serial.protocol_handler_packages.append(package)
 

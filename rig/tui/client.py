@@ -98,10 +98,7 @@ class ReconnectingClient:
     @property
     def state(self) -> DaemonState:
         """Latest state of the daemon."""
-        if self._client is None:
-            return DaemonState()
-        replica = self._client.replica
-        return read_state(replica.n, replica.state) if replica.state else DaemonState()
+        return read_state(self._client.replica.state if self._client else {})
 
     @property
     def driving(self) -> bool:
@@ -199,7 +196,7 @@ class ReconnectingClient:
         try:
             self._check(client.line.daemon)
             client.changed = partial(self._note, client.replica)
-            await client.subscribe()
+            await client.call("subscribe")
             self._client, self.silence = client, ""
             if self._wants_control and client.replica.state.get("control") is None:
                 with suppress(RigError):

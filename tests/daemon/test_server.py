@@ -119,7 +119,7 @@ async def test_an_endless_line_ends_the_connection_and_not_the_daemon(door):
 async def test_a_snapshot_has_every_section_that_is_promised(door):
     async with door() as (_server, path):
         client = await AsyncClient.connect(path, "tui")
-        await client.subscribe()
+        await client.call("subscribe")
         assert set(client.replica.state) == _SECTIONS
         assert client.replica.state["port"] == {
             "url": "sim://", "simulated": True, "path": "sim://",
@@ -138,7 +138,7 @@ async def test_a_client_that_does_not_read_costs_little_and_gets_a_snapshot_when
             await asyncio.sleep(0)
         (stuck,) = server.service.connections
         quick = await AsyncClient.connect(path, "quick")
-        await quick.subscribe()
+        await quick.call("subscribe")
         for number in range(400):
             server.published.set(error={"message": f"{number} " + "x" * 2000})
             server.service.publisher.spread()
@@ -302,7 +302,7 @@ NAMES = ["\ud800x", "\x1b[2J", "\u202etxt.exe", "a\nb", "\0", "ü" * 500]
 async def test_whatever_a_client_is_called_all_see_it(door):
     async with door() as (_server, path):
         watcher = await AsyncClient.connect(path, "watcher")
-        await watcher.subscribe()
+        await watcher.call("subscribe")
         for name in NAMES:
             client = await AsyncClient.connect(path, name)
             await client.call("take_control")
