@@ -8,6 +8,7 @@ from dataclasses import replace
 from html import unescape
 from pathlib import Path
 from time import monotonic
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.bench.findings import Findings
@@ -90,13 +91,8 @@ class FakeClient(ReconnectingClient):
 
     @property
     def connection(self) -> Any:
-        """Itself: nobody is asked."""
-        return self
-
-    async def call(self, method: str, **params: Any) -> Any:
         """Never answer."""
-        del method, params
-        await asyncio.Event().wait()
+        return SimpleNamespace(call=lambda *_, **__: self.keep())
 
     async def keep(self) -> None:
         """Wait to be cancelled."""
@@ -218,7 +214,7 @@ def _falling(state: DaemonState, view: SessionView, job: Job) -> DaemonState:
     section = {"run": job.run, "attempt": job.attempt, "state": "fired", "tick_hz": drop.tick_hz}
     edges = tuple([*edge] for edge in drop.edges if edge.tick <= until)
     sections = {**state.sections, "drop": section, "phase": "recording"}
-    return DaemonState(sections, state.runs, edges)
+    return replace(state, sections=sections, edges=edges)
 
 
 async def _looks(

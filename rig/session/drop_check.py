@@ -10,10 +10,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields, replace
 from enum import StrEnum
 from itertools import groupby
-from typing import Any
+from typing import Any, Literal
 
 from rig.link.messages import TEST_RUN, pack_events
-from rig.link.transcript import Direction, Incoming, Record, Restart, Transcript
+from rig.link.transcript import Incoming, Record, Restart, Transcript
 from rig.records import Certificate, ClockSample, Drop, Edge, Job, Pulse
 
 _U32 = (1 << 32) - 1
@@ -52,7 +52,7 @@ class ByteReplay:
         self.records: list[Drop | ClockSample | Pulse | Restart] = []
         self._transcript = Transcript()
 
-    def feed(self, chunks: Iterable[tuple[int, Direction, bytes]]) -> None:
+    def feed(self, chunks: Iterable[tuple[int, Literal["rx", "tx"], bytes]]) -> None:
         """Decode the next chunks: host time, direction and bytes."""
         for host_ns, direction, data in chunks:
             self.fed += 1

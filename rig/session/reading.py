@@ -11,11 +11,10 @@ from datetime import datetime
 from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 from rig.boards import GATES
 from rig.errors import RigError
-from rig.link.transcript import Direction
 from rig.reasons import Reason, rig_error
 from rig.records import ClockSample, Drop, HostBreak, Job, Pulse
 from rig.session.drop_check import ByteReplay, check_drop
@@ -25,6 +24,8 @@ from rig.session.rows import RowError, check_row, drop_of, named_values
 from rig.session.schema import TABLES, Row, RunState, read_identity, read_reasons
 
 T = TypeVar("T")
+Direction = Literal["rx", "tx"]
+"""``rx``: from the device to the host; ``tx``: from the host to the device."""
 
 
 UNBLINDED = "unblinded"

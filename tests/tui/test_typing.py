@@ -70,6 +70,10 @@ class Rig(FakeClient):
         super().__init__(state)
         self.told = []
 
+    @property
+    def connection(self):
+        return self
+
     async def call(self, method, **params):
         self.told.append((time.monotonic(), method))
         await (asyncio.Event().wait() if method == "collect" else asyncio.sleep(0))
