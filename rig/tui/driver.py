@@ -41,7 +41,7 @@ class Driver:
     def __init__(
         self,
         flow: Flow,
-        client: ReconnectingClient | None,
+        client: ReconnectingClient,
         follower: Follower,
         begin: Callable[[Coroutine[Any, Any, None]], object],
     ) -> None:
@@ -58,7 +58,7 @@ class Driver:
         if self.flow.stage is Stage.RESULT and self.flow.job is not None:
             self._follower.judged.add(self.flow.job)
         for effect in effects:
-            if isinstance(effect, campaign.Stop) and (self._client is None or self._client.idle):
+            if isinstance(effect, campaign.Stop) and self._client.idle:
                 continue  # without a rig, no chain can fall
             if isinstance(effect, campaign.Stop):
                 self.stop = StopAnswer(monotonic())
@@ -70,16 +70,13 @@ class Driver:
 
     async def open_session(self, protocol: str, session: str, seed: int | None) -> None:
         """Open a session in the daemon, now and after each restart."""
-        assert self._client is not None
         names = {"protocol": protocol, "session": session, "seed": seed}
         await self._client.connection.call("open_session", **names)
         self.asked = protocol, session
 
     async def _carry_out(self, effect: Effect, ticket: int) -> None:
         """Carry out an effect, and handle the resulting event."""
-        client = self._client
-        assert client is not None
-        token = None
+        client, token = self._client, None
         try:
             match effect:
                 case campaign.GiveUp():
