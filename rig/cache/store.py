@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import shutil
 import zlib
-from collections.abc import Iterable
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
@@ -20,8 +19,8 @@ import platformdirs
 
 _MOST_BYTES = 256 << 20
 """A session of 108 runs takes 2 MB of it."""
-_PARTS = 8
-"""Folders that share it: for room in one of them, the others need not be looked through."""
+_PARTS = 16
+"""Folders that share it, by a key's first digit: for room in one, no other is looked through."""
 
 
 class CacheSize(NamedTuple):
@@ -60,9 +59,12 @@ class CacheFolder:
             return
         with suppress(OSError):
             file = self._file(key)
-            if _size_of(file.parent.glob("*")).used_bytes + len(packed) > self._most_bytes:
-                shutil.rmtree(file.parent)
             file.parent.mkdir(exist_ok=True)
+            with os.scandir(file.parent) as beside:
+                used = sum(entry.stat().st_size for entry in beside)
+            if used + len(packed) > self._most_bytes:
+                shutil.rmtree(file.parent)
+                file.parent.mkdir()
             begun = file.with_suffix(f".{os.getpid()}")
             begun.write_bytes(packed)
             begun.replace(file)
@@ -70,7 +72,8 @@ class CacheFolder:
     def size(self) -> CacheSize | None:
         """Return how much is kept; `None` where no cache can be used."""
         with suppress(OSError):
-            return _size_of(self._private_folder().glob("*/*"))
+            sizes = [file.stat().st_size for file in self._private_folder().glob("*/*")]
+            return CacheSize(len(sizes), sum(sizes))
         return None
 
     def clear(self) -> None:
@@ -80,7 +83,7 @@ class CacheFolder:
 
     def _file(self, key: str) -> Path:
         name = sha256(key.encode()).hexdigest()
-        return self._private_folder() / f"{int(name[:2], 16) % _PARTS}" / name
+        return self._private_folder() / name[0] / name
 
     def _private_folder(self) -> Path:
         """Return the folder, made where it was missing.
@@ -97,8 +100,3 @@ class CacheFolder:
         if hasattr(os, "getuid") and (about.st_uid != os.getuid() or about.st_mode & 0o022):
             raise PermissionError(self.folder)
         return self.folder
-
-
-def _size_of(files: Iterable[Path]) -> CacheSize:
-    sizes = [file.stat().st_size for file in files]
-    return CacheSize(len(sizes), sum(sizes))
