@@ -242,11 +242,11 @@ async def _looks(
                 await pilot.pause(0.02)
 
         if shot.state.section("session"):
-            await until(lambda: app.view is not None and app.indicators.known)
+            await until(lambda: app.follower.view is not None and app.follower.indicators.known)
         if shot.page == "history":
             app.desk.players["history"] = Player(0, _REPLAYED_S)
             app.turn("history")
-        await until(lambda: app.page == shot.page and (app.view or app.desk.rows))
+        await until(lambda: app.page == shot.page and (app.follower.view or app.desk.rows))
         # All edges came at once, which looks like flicker for a while.
         await until(lambda: _all_counted(app, shot) and _quiet(app))
         for size in sizes:
@@ -262,12 +262,14 @@ def _as_svg(app: RigApp) -> str:
 
 
 def _all_counted(app: RigApp, shot: Screenshot) -> bool:
-    return len(shot.state.edges) <= sum(gate.edges for gate in app.indicators.gates)
+    return len(shot.state.edges) <= sum(gate.edges for gate in app.follower.indicators.gates)
 
 
 def _quiet(app: RigApp) -> bool:
     now = monotonic()
-    return all(gate.steady(now) and not gate.flickers(now) for gate in app.indicators.gates)
+    return all(
+        gate.steady(now) and not gate.flickers(now) for gate in app.follower.indicators.gates
+    )
 
 
 async def at_rest(app: RigApp, pilot: Pilot[None], look: Callable[[], str]) -> str:

@@ -29,7 +29,7 @@ def wiring_drawing(protocol: Protocol, board: str) -> str:
     used = {*words, f"release-{protocol.release.channel}"}
     for prefix, uri in (("", _SVG), ("xlink", "http://www.w3.org/1999/xlink")):
         ElementTree.register_namespace(prefix, uri)
-    root = ElementTree.fromstring(TARGETS[board].wiring_path.read_text("utf-8"))  # noqa: S314 - our own
+    root = ElementTree.parse(TARGETS[board].wiring_path).getroot()  # noqa: S314 - our own
     for node in list(root):
         part = node.get("class", "")
         if _OPTIONAL.fullmatch(part) and part not in used:

@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import NamedTuple
 
 from rig.errors import DeviceError, RigError, SessionError
-from rig.reasons import Reason, error_of, make_reason, remedies
+from rig.reasons import Reason, error_of, make_reason, remedies, rig_error
 
 _ENUM = re.compile(r"<(?:\w+\.)?([\w|]+): \w+>")  # as Python writes a member of an enumeration
 
@@ -70,11 +70,11 @@ def explain(name: str, error: RigError, verdict: Verdict = Verdict.FAILED) -> Fi
     return Finding(name, reason.text, verdict, reason)
 
 
-def wrong_answer(request: str, expected: object, answer: object) -> DeviceError:
+def wrong_answer(request: str, expected: object, answer: object) -> RigError:
     """Return the failure of a board that gave another answer than expected."""
     expected, answer = (_ENUM.sub(r"\1", str(value)) for value in (expected, answer))
     values = {"request": request, "expected": expected, "answer": answer}
-    return error_of(DeviceError, make_reason("wrong_answer", **values))
+    return rig_error("wrong_answer", **values)
 
 
 def fail_if(broken: object, code: str, **values: object) -> None:

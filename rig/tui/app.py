@@ -35,10 +35,8 @@ if TYPE_CHECKING:
 
     from textual.filter import LineFilter
 
-    from rig.results.live import SessionView
     from rig.tui.context import Options
     from rig.tui.desk import Face
-    from rig.tui.indicators import Indicators
 
 TICK_S = 0.1
 _LEAST_S = 0.01  # least time between ticks, after a late tick
@@ -256,16 +254,6 @@ class RigApp(App[None], inherit_bindings=False):
     def flow(self) -> Flow:
         """State of the campaign."""
         return self.driver.flow
-
-    @property
-    def indicators(self) -> Indicators:
-        """The gates."""
-        return self.follower.indicators
-
-    @property
-    def view(self) -> SessionView | None:
-        """Latest view of the session file."""
-        return self.follower.view
 
     @property
     def driving(self) -> bool:
