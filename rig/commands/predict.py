@@ -2,9 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
-from rig.analysis.distributions import COVERAGE_95
 from rig.commands.output import Arguments, print_data, say
 from rig.files import write_atomic
 from rig.measurands import SEPARATION, SPEED, Measurand
@@ -15,6 +13,7 @@ from rig.protocol.protocol import Protocol
 from rig.report.columns import table_parts
 from rig.report.numbers import fixed
 from rig.text_table import csv_text
+from rig.units import Quantity
 
 
 def main(arguments: Arguments) -> None:
@@ -42,10 +41,10 @@ def _write_table(protocol: Protocol, lines: list[PredictedIncline]) -> list[str]
     return [*part.table, *notes]
 
 
-def _value(line: PredictedIncline, row: Measurand) -> SimpleNamespace:
+def _value(line: PredictedIncline, row: Measurand) -> Quantity | None:
     """Return a prediction with what its own numbers leave open."""
-    u = getattr(line, row.key("u"))
-    return SimpleNamespace(value=getattr(line, row.name), expanded=u and COVERAGE_95 * u)
+    value = getattr(line, row.name)
+    return None if value is None else Quantity(value, getattr(line, row.key("u")) or 0.0)
 
 
 def _write_figure(number: int, path: Path) -> None:
