@@ -5,15 +5,14 @@ from pathlib import Path
 
 from rig.commands.output import Arguments, print_data, say
 from rig.files import write_atomic
-from rig.measurands import SEPARATION, SPEED, Measurand
+from rig.measurands import SEPARATION, SPEED
 from rig.model.prediction import PredictedIncline
-from rig.predictions import group_notes, predictions
+from rig.predictions import group_notes, predictions, quantities
 from rig.protocol import reader
 from rig.protocol.protocol import Protocol
 from rig.report.columns import table_parts
 from rig.report.numbers import fixed
 from rig.text_table import csv_text
-from rig.units import Quantity
 
 
 def main(arguments: Arguments) -> None:
@@ -31,7 +30,7 @@ def _write_table(protocol: Protocol, lines: list[PredictedIncline]) -> list[str]
     """Lay predictions out as text, notes below; without columns of what the scene does not have."""
     struck = protocol.surface is not None
     rows = (SEPARATION, SPEED) if protocol.two_chains else (SPEED,)
-    values = {"values": lambda line: {row.name: _value(line, row) for row in rows}}
+    values = {"values": lambda line: quantities(line, *rows)}
     (part,) = table_parts("predictions" if struck else "fall", lines, derived=values)
     part = replace(part, rows=[[cell or "–" for cell in row] for row in part.rows])
     notes = group_notes(lines)
@@ -39,12 +38,6 @@ def _write_table(protocol: Protocol, lines: list[PredictedIncline]) -> list[str]
         free = dict.fromkeys(fixed(line.free_fall_speed_m_s, 4) for line in lines)
         notes.insert(0, f"free fall: {SPEED.symbol} = {' or '.join(free)} {SPEED.unit}")
     return [*part.table, *notes]
-
-
-def _value(line: PredictedIncline, row: Measurand) -> Quantity | None:
-    """Return a prediction with what its own numbers leave open."""
-    value = getattr(line, row.name)
-    return None if value is None else Quantity(value, getattr(line, row.key("u")) or 0.0)
 
 
 def _write_figure(number: int, path: Path) -> None:
