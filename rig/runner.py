@@ -23,7 +23,7 @@ from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
 from rig.recorder.interrupts import Interrupts
 from rig.recorder.run_lines import plan_lines
-from rig.records import Drop, Job
+from rig.records import Job
 from rig.report.templates import sentence
 from rig.results import SessionResults, results
 from rig.results.live import LiveAnalysis
@@ -129,7 +129,6 @@ class Campaign:
         self.flow = Flow(Stage.DEVICE, countdown_s=0.0, attended=attended, row=row)
         self.live = LiveAnalysis(self.session.path)
         self._clock_u: float | None = None
-        self._drop: Drop | None = None  # collected last
         self._result: DropResult | None = None  # of the drop judged last
         self._failed: DeviceRefusedError | None = None
 
@@ -214,7 +213,7 @@ class Campaign:
                 case machine.FireRelease(armed):
                     self.rig.fire(armed)
                 case machine.Collect(job):
-                    self._drop = self.rig.collect(*job)
+                    self.rig.collect(*job)
                 case machine.Judge(job):
                     return self._judge(job)
                 case machine.Log(job, state, reasons):
@@ -233,10 +232,9 @@ class Campaign:
         return machine.EffectDone(self.flow.ticket, token)
 
     def _judge(self, job: Job) -> Event:
-        if self._drop is None or job != self._drop.job:
-            self._drop = self.rig.collect(*job)
+        drop = self.rig.collect(*job)  # as it is in the session
         with self.interrupts.let_through():
-            result = self._result = self.live.judge(self.session, self._drop)
+            result = self._result = self.live.judge(self.session, drop)
         return machine.DropVerdict(self.flow.ticket, result.verdict, result.reasons)
 
     def _stop(self, why: str) -> None:
