@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -27,18 +28,15 @@ def open_for(protocol: Protocol, source: Path, url: str, path: Path) -> Session:
         if simulated:
             truth_file(path).unlink(missing_ok=True)  # of a session that is gone
         return Session.create(path, protocol.text, source.name, simulated=simulated, origin=url)
-    session = Session.open(path)
-    code, values = "", {"path": str(path)}
-    if session.protocol_text != protocol.text:
-        code, values["source"] = "other_protocol", session.protocol_source
-    elif session.simulated != simulated:
-        recorded, kind = (
-            ("simulated", "a real port") if session.simulated else ("real", "a simulation")
-        )
-        code, values = "session_mixed", values | {"recorded": recorded, "port": url, "kind": kind}
-    if code:
-        session.close()
-        raise rig_error(code, **values)
+    with ExitStack() as undo:
+        session = undo.enter_context(Session.open(path))
+        if session.protocol_text != protocol.text:
+            raise rig_error("other_protocol", path=str(path), source=session.protocol_source)
+        if session.simulated != simulated:
+            recorded, kind = ("real", "a simulation") if simulated else ("simulated", "a real port")
+            values = {"path": str(path), "recorded": recorded, "port": url, "kind": kind}
+            raise rig_error("session_mixed", **values)
+        undo.pop_all()
     return session
 
 
