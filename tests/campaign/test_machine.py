@@ -12,7 +12,6 @@ from rig.campaign.plan import (
     ATTEMPTS,
     CLOCK_S,
     CLOCK_U,
-    RunLine,
     describe_setup,
     job_to_judge,
     next_job,
@@ -22,6 +21,7 @@ from rig.campaign.voids import MANY, Void, after, in_common, voids_of, why_halte
 from rig.link.messages import RefusalReason
 from rig.protocol.protocol import Run
 from rig.reasons import make_reason, plain_reason
+from rig.recorder.run_lines import RunLine
 from rig.records import Job
 from rig.session.reading import StateEntry
 from rig.session.schema import RunState
@@ -396,6 +396,4 @@ def test_what_was_heard_of_since_the_log_was_read_counts_once(run_line):
 
 @pytest.fixture
 def run_line():
-    from rig.campaign.plan import RunLine
-
     return lambda run, attempt: RunLine(run, 0.0, "A", "B", attempt, "void")

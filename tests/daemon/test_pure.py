@@ -14,23 +14,25 @@ from hypothesis import strategies as st
 from bench.process_fixture import FENCE
 from rig.daemon import rpc
 from rig.daemon.client import Client, Line
-from rig.daemon.lease import LEASE_S, ControlError, Lease
+from rig.daemon.lease import LEASE_S, Lease
 from rig.daemon.listener import Door
 from rig.daemon.replica import Replica
 from rig.daemon.worker import Worker
 from rig.errors import (
+    ControlError,
     DeviceError,
     DeviceTimeoutError,
     DomainError,
     InputError,
     RigError,
     SessionError,
+    VersionError,
 )
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.recorder.controller import Controller
-from rig.recorder.interrupts import Interrupts, StoppedError
+from rig.recorder.interrupts import Interrupts
 from rig.recorder.published import EDGES_LIMIT, PublishedState
 from tests.tables import cases
 from tests.waiting import PATIENCE_S
@@ -44,8 +46,8 @@ ERRORS = [
     DeviceRefusedError(RefusalReason.GATE_BLOCKED, 0b101),
     DeviceRefusedError(RefusalReason.NOT_ARMED, 0, DisarmReason.HOST_SILENT),
     ControlError("taken"),
-    make_error(StoppedError, "stopped", text="stopped by Ada"),
-    rpc.VersionError("old"),
+    rig_error("stopped", text="stopped by Ada"),
+    VersionError("old"),
 ]
 
 

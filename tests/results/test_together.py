@@ -53,7 +53,7 @@ def test_runs_of_both_count_in_one_mean_and_keep_their_sessions_names(two, call)
 
 
 def test_nothing_that_is_kept_is_used_where_that_is_asked_for(two, call, monkeypatch):  # noqa: F811
-    monkeypatch.setattr("rig.cache.store.CacheFile.get", None)
+    monkeypatch.setattr("rig.cache.store.CacheFolder.get", None)
     assert call("compare", *two, "--fresh").code == 0
 
 
