@@ -24,8 +24,8 @@ from rig.protocol.protocol import Protocol
 from rig.recorder.interrupts import Interrupts
 from rig.records import Drop, Job
 from rig.report.templates import sentence
-from rig.results import SessionResults, results
 from rig.results.live import LiveAnalysis
+from rig.results.whole import SessionResults, results
 from rig.session.schema import RunState
 from rig.session.store import Session
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig.analysis.quantities import COMMON
+from rig.analysis.budget_lines import COMMON
 from rig.analysis.result import Measured
 
 

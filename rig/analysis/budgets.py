@@ -21,13 +21,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rig.analysis.budget_lines import BUDGET, COMMON, effective_degrees
 from rig.analysis.distributions import COVERAGE_95, coverage_factor
 from rig.analysis.drop_model import DropModel
 from rig.analysis.dual import Dual
 from rig.analysis.gate_passages import GatePassage, gate_passages
 from rig.analysis.joint_fit import JointFit
 from rig.analysis.joint_step import JointDrop
-from rig.analysis.quantities import BUDGET, COMMON, AdjustedDrop, effective_degrees, measurands
+from rig.analysis.quantities import AdjustedDrop, measurands
 from rig.analysis.result import Deviation, Measured
 from rig.analysis.unknowns import Side
 from rig.arrays import Array, Flags, Index

@@ -11,12 +11,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import fmean
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from rig.analysis.distributions import chi2_tail, coverage_factor
-from rig.analysis.plain_data import attributes, plain
+from rig.analysis.plain_data import Record
 from rig.analysis.result import Deviation, DropResult, Measured
 from rig.arrays import Array
 from rig.measurands import averaged
@@ -38,6 +38,8 @@ class Difference(Measured):
         Drops in the mean.
     """
 
+    MEMBERS = "*condition difference=value n u normalized_error chi2 p"
+
     condition: Condition
     n: int
 
@@ -51,14 +53,9 @@ class Difference(Measured):
         """Probability of a χ² at least as large by chance."""
         return chi2_tail(self.chi2, 1)
 
-    def json(self) -> dict[str, Any]:
-        """Return a member of ``inclines``."""
-        names = ("n", "u", "normalized_error", "chi2", "p")
-        return {**self.condition.json(), "difference": self.value, **attributes(self, *names)}
-
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class Comparison(Record):
     """Comparison of a measurand with the model.
 
     Attributes
@@ -68,6 +65,8 @@ class Comparison:
     chi2
         χ² of all conditions together, with their covariance.
     """
+
+    MEMBERS = "quantity chi2 degrees p inclines=differences"
 
     quantity: str
     chi2: float
@@ -82,11 +81,6 @@ class Comparison:
     def p(self) -> float:
         """Probability of a χ² at least as large by chance."""
         return chi2_tail(self.chi2, self.degrees)
-
-    def json(self) -> dict[str, Any]:
-        """Return a member of ``comparison``."""
-        fields = attributes(self, "quantity", "chi2", "degrees", "p")
-        return fields | {"inclines": plain(self.differences)}
 
 
 def compare(protocol: Protocol, cases: Sequence[Sequence[DropResult]]) -> tuple[Comparison, ...]:

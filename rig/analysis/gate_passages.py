@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from rig.analysis.dual import Dual
 from rig.analysis.fit import DropFit
-from rig.analysis.plain_data import attributes
+from rig.analysis.plain_data import Record
 from rig.analysis.quantities import AdjustedDrop
 from rig.analysis.result import Measured
 from rig.protocol.protocol import Gate
 
 
 @dataclass(frozen=True, slots=True)
-class GatePassage:
+class GatePassage(Record):
     """Passage of an object's middle through a beam.
 
     Attributes
@@ -30,15 +29,12 @@ class GatePassage:
         Time since the previous gate, s; `None` at the first, or if the previous saw nothing.
     """
 
+    MEMBERS = "channel height_m speed_m_s=speed interval_s=interval?"
+
     channel: int
     height_m: float
     speed: Measured
     interval: Measured | None
-
-    def json(self) -> dict[str, Any]:
-        """Return a member of ``gates`` of a run."""
-        fields = attributes(self, "channel", "height_m") | {"speed_m_s": self.speed.json()}
-        return fields if self.interval is None else fields | {"interval_s": self.interval.json()}
 
 
 def gate_passages(

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from rig.analysis.averages import mean
 from rig.analysis.equations import standardise
 from rig.analysis.evidence import STATED_WEIGHT
 from rig.analysis.fit import Fit, count_matched
-from rig.analysis.plain_data import attributes
+from rig.analysis.plain_data import Record
 from rig.analysis.result import GOOD, DropResult, Measured
 from rig.analysis.square_root import square_root
 from rig.analysis.unknowns import ANY_GRAVITY
@@ -32,7 +31,7 @@ _FEWEST = 8  # edges
 
 
 @dataclass(frozen=True, slots=True)
-class GravityCheck:
+class GravityCheck(Record):
     """Gravity from the free chain, compared with the protocol's.
 
     Attributes
@@ -44,6 +43,8 @@ class GravityCheck:
     drops
         Number of drops.
     """
+
+    MEMBERS = "gravity_m_s2=measured stated_m_s2=stated.value drops normalized_error agrees"
 
     measured: Measured
     stated: Quantity
@@ -65,17 +66,9 @@ class GravityCheck:
         """Reason for a disagreement; empty if both values agree."""
         if self.agrees:
             return ()
-        found = {
-            "g": self.measured.value,
-            "U": self.measured.expanded,
-            "E_n": self.normalized_error,
-        }
-        return (make_reason("gravity_unlike", stated=self.stated.value, **found),)
-
-    def json(self) -> dict[str, Any]:
-        """Return ``gravity`` of ``calibration``."""
-        fields = {"gravity_m_s2": self.measured.json(), "stated_m_s2": self.stated.value}
-        return fields | attributes(self, "drops", "normalized_error", "agrees")
+        values = {"g": self.measured.value, "U": self.measured.expanded}
+        error, stated = self.normalized_error, self.stated.value
+        return (make_reason("gravity_unlike", stated=stated, E_n=error, **values),)
 
 
 def check_gravity(protocol: Protocol, results: Iterable[DropResult]) -> GravityCheck | None:

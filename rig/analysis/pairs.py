@@ -10,12 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from rig.analysis.averages import combine
-from rig.analysis.plain_data import attributes
+from rig.analysis.plain_data import Record
 from rig.analysis.result import GOOD, DropResult, Measured
 from rig.arrays import Array
 from rig.measurands import MEASURANDS
@@ -26,13 +25,13 @@ _CHAINS_OWN = ("spacing", "width")  # common lines of a budget that differ betwe
 
 
 @dataclass(frozen=True, slots=True)
-class Effects:
+class Effects(Record):
     """Effects at an incline.
 
     Attributes
     ----------
-    first, second
-        The chains: A and B.
+    chains
+        Names of the chains, A and B.
     blocks
         Number of complete blocks of good runs.
     chain
@@ -42,17 +41,13 @@ class Effects:
         of the sides: the delay of the free side's release.
     """
 
+    MEMBERS = "incline_deg blocks chain side chains"
+
     incline_deg: float
-    first: str
-    second: str
+    chains: tuple[str, str]
     blocks: int
     chain: Mapping[str, Measured]
     side: Mapping[str, Measured]
-
-    def json(self) -> dict[str, Any]:
-        """Return a member of ``effects``."""
-        fields = attributes(self, "incline_deg", "blocks", "chain", "side")
-        return fields | {"chains": [self.first, self.second]}
 
 
 def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects, ...]:
@@ -88,7 +83,7 @@ def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects,
             rows = [row for row in MEASURANDS.values() if row.name in blocks[0][0].quantities]
             chain = {r.name: _effect(blocks, r.name, signs / 2.0) for r in rows if r.by_chain}
             side = {r.name: _effect(blocks, r.name, signs**2 / 4.0) for r in rows if r.by_side}
-            every.append(Effects(incline, first, second, len(blocks), chain, side))
+            every.append(Effects(incline, (first, second), len(blocks), chain, side))
     return tuple(every)
 
 

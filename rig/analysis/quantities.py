@@ -1,9 +1,8 @@
-"""The measurands as functions of the fitted unknowns, and the lines of their budget."""
+"""The measurands as functions of the fitted unknowns."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -17,60 +16,9 @@ from rig.analysis.dual import Dual
 from rig.analysis.swing import lever
 from rig.analysis.trajectory import Trajectory
 from rig.arrays import Array
-from rig.protocol.protocol import GUESSED
 
 _STEP = 1e-3
 """Way over which a rod's speed along its chain is taken, m: strings act over a hundred times it."""
-
-
-class BudgetLine(NamedTuple):
-    """Properties of a line of the uncertainty budget.
-
-    Attributes
-    ----------
-    common
-        Whether the error is the same in every run, so that averaging does not reduce it.
-    guessed
-        Whether its size is an assumption, unless a joint fit estimates it.
-    scale
-        Variance component that a joint fit estimates, and whose degrees of freedom the line has.
-    known
-        Input that could be measured better, with the protocol's key; empty if there is none.
-    """
-
-    common: bool = False
-    guessed: bool = False
-    scale: str = ""
-    known: str = ""
-
-
-BUDGET = {
-    "edges": BudgetLine(scale="jitter"),
-    "clock": BudgetLine(common=True, known="the clock's rate"),
-    "gravity": BudgetLine(common=True, known="gravity (`gravity`)"),
-    "air": BudgetLine(common=True, known="the air's drag (`drag`)"),
-    "drop height": BudgetLine(common=True, known="the drop height (`drop`)"),
-    "datum": BudgetLine(common=True, known="the zero of each post (`datum_uncertainty`)"),
-    "beam heights": BudgetLine(
-        common=True, scale="gates", known="the heights of the beams (`height_uncertainty`)"
-    ),
-    "side": BudgetLine(
-        common=True, guessed=True, known="how much higher one side hangs (`priors: side`)"
-    ),
-    "beam offsets": BudgetLine(
-        common=True, guessed=True, scale="beam", known="the aim of the beams (`beam_offset`)"
-    ),
-    "spacing": BudgetLine(common=True, scale="rods", known="the spacing (`position_uncertainty`)"),
-    "width": BudgetLine(common=True, known="the width (`width_uncertainty`)"),
-    "start height": BudgetLine(guessed=True, scale="hang"),
-    "swing": BudgetLine(guessed=True, scale="swing"),
-    "single impulses": BudgetLine(guessed=True, scale="impulse"),
-    "top rod": BudgetLine(guessed=True, scale="departure"),
-    "stretch": BudgetLine(common=True, guessed=True, scale="stretch"),
-    "late pull": BudgetLine(guessed=True, scale="bounce"),
-    "contact": BudgetLine(guessed=True),
-}
-COMMON = tuple(name for name, line in BUDGET.items() if line.common)
 
 
 def measurands(model: DropModel, x: Array) -> dict[str, Dual]:
@@ -78,24 +26,6 @@ def measurands(model: DropModel, x: Array) -> dict[str, Dual]:
     drop = AdjustedDrop(model, x)
     values = ((name, compute(drop)) for name, compute in COMPUTED.items())
     return {name: value for name, value in values if value is not None}
-
-
-def effective_degrees(u: float, budget: Mapping[str, float], degrees: Mapping[str, float]) -> float:
-    """Return the effective degrees of freedom by Welch–Satterthwaite (GUM G.4); at least 1.
-
-    Parameters
-    ----------
-    budget
-        Lines whose squares add up to that of `u`.
-    degrees
-        Degrees of freedom of lines; `GUESSED` for other guessed lines, infinite for the rest.
-    """
-    share = sum(
-        (line / u) ** 4 / degrees.get(name, GUESSED)
-        for name, line in budget.items()
-        if name in degrees or BUDGET[name].guessed
-    )
-    return max(1.0, 1.0 / share) if share > 0.0 else math.inf
 
 
 class _Strike(NamedTuple):

@@ -1,11 +1,12 @@
-"""Analysis of a session: each drop by itself, then the joint fit and the summary."""
+"""Analysis of sessions: each drop by itself, then the joint fit and the summary."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from operator import length_hint
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 from typing import Protocol as Interface
 
 from rig.analysis.budgets import Budgets
@@ -15,7 +16,7 @@ from rig.analysis.fit import DropFit, Fit, alone
 from rig.analysis.joint_fit import FEWEST, JointFit, RigEstimate, joint_fit
 from rig.analysis.joint_step import JointDrop
 from rig.analysis.pairs import Effects, effects
-from rig.analysis.plain_data import attributes, plain
+from rig.analysis.plain_data import Record
 from rig.analysis.processes import do_in_order
 from rig.analysis.result import GOOD, DropResult
 from rig.analysis.summary import Incline, summarize
@@ -29,6 +30,8 @@ from rig.records import Drop
 from rig.threads import one_thread
 
 Progress = Callable[[int, int], None]
+Causes = Mapping[tuple[int, int], Sequence[Reason]]
+"""Causes by run and attempt, for drops that the operator rejected."""
 
 K = TypeVar("K")
 
@@ -49,7 +52,7 @@ class SummaryByDrop(Interface):
 
 
 @dataclass(frozen=True, slots=True)
-class Analysis:
+class Analysis(Record):
     """All results of a session.
 
     Attributes
@@ -74,6 +77,10 @@ class Analysis:
     with_rejected
         The summary including rejected runs that are good by their limits; empty if there are none.
     """
+
+    MEMBERS = (
+        "runs summary superseded? summary_with_rejected=with_rejected? *failure effects? *rig?"
+    )
 
     runs: tuple[DropResult, ...]
     superseded: tuple[DropResult, ...]
@@ -104,18 +111,28 @@ class Analysis:
         line = f"damaged records, left out: {count} ({names}); see rig recover SESSION"
         return [line] if names else []
 
-    def json(self) -> dict[str, Any]:
-        """Return the object that `rig analyze --json` prints."""
-        where_there_are = {
-            "superseded": self.superseded or None,
-            "summary_with_rejected": self.with_rejected or None,
-            "joint_fit_converged": False if self.unsettled else None,
-            "effects": self.effects or None,
-            "learned": None if self.rig is None else self.rig.learned,
-            "likeness": None if self.rig is None else self.rig.likeness,
-        }
-        fields = {name: plain(part) for name, part in where_there_are.items() if part is not None}
-        return attributes(self, "runs", "summary") | fields
+    @property
+    def failure(self) -> dict[str, bool]:
+        """Whether the joint fit failed, for JSON; empty if it did not."""
+        return {"joint_fit_converged": False} if self.unsettled else {}
+
+
+class SessionDrops(NamedTuple):
+    """Drops of a session, each analysed by itself.
+
+    Attributes
+    ----------
+    protocol
+        The scene and its plan.
+    results
+        Result of each drop, by run and attempt.
+    fits
+        Those that take part in a joint fit.
+    """
+
+    protocol: Protocol
+    results: Mapping[tuple[int, int], DropResult]
+    fits: Mapping[tuple[int, int], DropFit]
 
 
 @one_thread
@@ -123,7 +140,7 @@ def analyze(
     protocol: Protocol,
     drops: Iterable[Drop],
     scale: Callable[[Drop], TimeScale],
-    rejected: Mapping[tuple[int, int], Sequence[Reason]] | None = None,
+    rejected: Causes | None = None,
     progress: Progress | None = None,
     summaries: SummaryByDrop | None = None,
     total: int | None = None,
@@ -140,7 +157,7 @@ def analyze(
     scale
         Function that returns the calibration of a drop's ticks.
     rejected
-        Causes by (run, attempt), for drops that the operator rejected.
+        As for `gather`.
     progress
         Called with the number of drops done and the total.
     summaries
@@ -158,33 +175,29 @@ def analyze(
     check_gates(protocol)
     check_measurable(protocol)
     planned = {run.number: run for run in planned_runs(protocol)}
-    summaries, rejected = {} if summaries is None else summaries, rejected or {}
+    known: SummaryByDrop = {} if summaries is None else summaries
     total = length_hint(drops) if total is None else total
-    results: list[DropResult] = []
-    drops_adjusted: list[DropFit | None] = []
-    unexplained = 0
 
-    def take(task: tuple[DropCase, DropSummary | None], summary: DropSummary) -> None:
-        nonlocal unexplained
-        case, before = task
-        # A fault of the rig affects every drop: searching in a few drops suffices.
-        explain = unexplained < _EXPLAINED
-        if summary.needs_explanation and summary.explained != explain:
-            summary = case.summary(summary, explain=explain)
-        unexplained += summary.needs_explanation
-        if summary is not before:
-            summaries[case.drop] = summary
-        result = overrule(summary.result, rejected.get((case.run.number, case.drop.attempt)))
-        results.append(result)
-        drops_adjusted.append(case.restore_drop(summary) if joins(protocol, result) else None)
-        if progress is not None:
-            progress(len(results), total)
+    def summarize_drops() -> Generator[tuple[DropCase, DropSummary]]:
+        cases = (
+            DropCase(protocol, planned_run(planned, drop), drop, scale(drop)) for drop in drops
+        )
+        tasks = ((case, known.get(case.drop)) for case in cases)
+        analysed, unexplained = do_in_order(_summarize, tasks, total, processes), 0
+        for done, ((case, before), first) in enumerate(analysed, 1):
+            # A fault of the rig affects every drop: searching in a few drops suffices.
+            explain = unexplained < _EXPLAINED
+            again = first.needs_explanation and first.explained != explain
+            summary = case.summary(first, explain=explain) if again else first
+            unexplained += summary.needs_explanation
+            if summary is not before:
+                known[case.drop] = summary
+            yield case, summary
+            if progress is not None:
+                progress(done, total)
 
-    cases = (DropCase(protocol, planned_run(planned, drop), drop, scale(drop)) for drop in drops)
-    do_in_order(
-        _summarize, ((case, summaries.get(case.drop)) for case in cases), take, total, processes
-    )
-    return gather(protocol, results, drops_adjusted)
+    with closing(summarize_drops()) as summarized:  # ends other processes
+        return gather(protocol, summarized, rejected or {})
 
 
 def _summarize(task: tuple[DropCase, DropSummary | None]) -> DropSummary:
@@ -209,22 +222,18 @@ def planned_run(planned: Mapping[int, Run], drop: Drop) -> Run:
     return planned[drop.run]
 
 
-def overrule(result: DropResult, causes: Sequence[Reason] | None) -> DropResult:
-    """Return a result rejected for the operator's causes; unchanged if there are none."""
+def overrule(result: DropResult, rejected: Causes) -> DropResult:
+    """Return a drop's result, rejected if the operator rejected the drop."""
+    causes = rejected.get((result.run.number, result.attempt))
     if causes is None:
         return result
     reasons = (*causes, *result.reasons)
     return replace(result, verdict="rejected", reasons=reasons, limits=result.verdict)
 
 
-def joins(protocol: Protocol, result: DropResult) -> bool:
-    """Whether a drop takes part in the joint fit, given its own result."""
-    return result.verdict in GOOD or nearly_in_time(result, protocol.accept.release_skew)
-
-
 @one_thread
 def gather(
-    protocol: Protocol, results: Sequence[DropResult], drops: Sequence[DropFit | None]
+    protocol: Protocol, drops: Iterable[tuple[DropCase, DropSummary]], rejected: Causes
 ) -> Analysis:
     """Fit drops together that were analysed individually, and summarize.
 
@@ -232,18 +241,46 @@ def gather(
     ----------
     protocol
         The scene and its plan.
-    results, drops
-        Each drop's own result and fit; `None` for the fit of a drop that does not take part.
+    drops
+        Drops with their own summaries.
+    rejected
+        Causes by run and attempt, for drops that the operator rejected.
     """
-    good = {n: drop for n, drop in enumerate(drops) if drop is not None}
-    together = fit_together(dict(enumerate(results)), good)
-    adjusted = {
-        (result.run.number, result.attempt): drop if isinstance(drop, JointDrop) else alone(drop)
-        for n, drop in together.drops.items()
-        if (result := together.results[n]).verdict in GOOD
-    }
-    analysis = sum_up(protocol, together.results.values(), together.joint, adjusted)
-    return replace(analysis, unsettled=not together.settled)
+    results, fits = dict[tuple[int, int], DropResult](), dict[tuple[int, int], DropFit]()
+    for case, summary in drops:
+        result = results[case.drop.job] = overrule(summary.result, rejected)
+        if result.verdict in GOOD or nearly_in_time(result, protocol.accept.release_skew):
+            fit = case.restore_drop(summary)
+            fits |= {} if fit is None else {case.drop.job: fit}
+    return fit_sessions([SessionDrops(protocol, results, fits)])[0]
+
+
+def fit_sessions(sessions: Sequence[SessionDrops]) -> list[Analysis]:
+    """Fit the drops of sessions together, and summarize each session.
+
+    A verdict depends on the drop alone, by limits fixed beforehand. The joint fit changes values,
+    and a verdict only where the drop alone cannot decide whether the release skew is within its
+    limit.
+    """
+    results = {(n, job): one for n, s in enumerate(sessions) for job, one in s.results.items()}
+    fits = {(n, job): fit for n, s in enumerate(sessions) for job, fit in s.fits.items()}
+    joint = _fit_jointly(results, fits)
+    settled = joint if joint is not None and joint.settled else None
+    if settled is not None:
+        budgets = Budgets(settled)
+        for key, drop in zip(fits, settled.drops, strict=True):
+            fits[key], results[key] = drop, _joint_result(results[key], drop, budgets)
+    analyses = []
+    for n, session in enumerate(sessions):
+        own = {job: result for (place, job), result in results.items() if place == n}
+        adjusted = {
+            job: fit if isinstance(fit, JointDrop) else alone(fit)
+            for (place, job), fit in fits.items()
+            if place == n and own[job].verdict in GOOD
+        }
+        analysis = sum_up(session.protocol, own.values(), settled, adjusted)
+        analyses.append(replace(analysis, unsettled=joint is not settled))
+    return analyses
 
 
 def sum_up(
@@ -266,72 +303,45 @@ def sum_up(
     ordered = sorted(results, key=lambda result: (result.run.number, result.attempt))
     last = {result.run.number: result for result in ordered}
     latest = tuple(last.values())
-    earlier = tuple(result for result in ordered if last[result.run.number] is not result)
-    summary = tuple(summarize(protocol, latest))
     spared = any(result.limits in GOOD for result in latest)
-    with_rejected = tuple(summarize(protocol, latest, rejected=True)) if spared else ()
-    paired = effects(protocol, latest)
-    rig = None if joint is None else joint.rig
-    return Analysis(latest, earlier, summary, rig, joint, adjusted or {}, paired, with_rejected)
+    return Analysis(
+        latest,
+        tuple(result for result in ordered if last[result.run.number] is not result),
+        tuple(summarize(protocol, latest)),
+        None if joint is None else joint.rig,
+        joint,
+        adjusted or {},
+        effects(protocol, latest),
+        tuple(summarize(protocol, latest, rejected=True)) if spared else (),
+    )
 
 
-class FittedTogether(NamedTuple, Generic[K]):
-    """Drops after a joint fit.
+def _fit_jointly(results: dict[K, DropResult], fits: dict[K, DropFit]) -> JointFit | None:
+    """Fit drops together; `None` if there are too few.
 
-    Attributes
-    ----------
-    joint
-        `None` if there are too few drops, or their fit did not converge.
-    results
-        Results of all drops.
-    drops
-        Drops of the joint fit; without a joint fit, the input to it.
-    settled
-        Whether no fit failed.
+    A drop that loses matched edges in the joint fit is taken out of `fits`, with a reason in
+    `results`, and keeps its own values.
     """
-
-    joint: JointFit | None
-    results: dict[K, DropResult]
-    drops: Mapping[K, DropFit]
-    settled: bool = True
-
-
-def fit_together(results: Mapping[K, DropResult], drops: Mapping[K, DropFit]) -> FittedTogether[K]:
-    """Fit good drops together and update their results.
-
-    A verdict depends on the drop alone, by limits fixed beforehand. The joint fit changes values,
-    and a verdict only where the drop alone cannot decide whether the release skew is within its
-    limit. A drop that loses matched edges in the joint fit is left out and keeps its own values.
-
-    Parameters
-    ----------
-    results, drops
-        Results of all drops, and the fits of the good ones.
-    """
-    outcome, good = dict(results), dict(drops)
-    while len(good) >= FEWEST:
-        joint = joint_fit(list(good.values()))
+    drops = len(fits)
+    while len(fits) >= FEWEST:
+        joint = joint_fit(list(fits.values()))
         fewer = {
             key: drop.match_count
-            for (key, fit), drop in zip(good.items(), joint.drops, strict=joint.settled)
+            for (key, fit), drop in zip(fits.items(), joint.drops, strict=joint.settled)
             if drop.match_count < KEPT * fit.match_count
         }
         # If most drops are left out, the fit has failed, not the drops.
-        if not joint.settled or 2 * (len(drops) - len(good) + len(fewer)) > len(drops):
-            return FittedTogether(None, outcome, good, settled=False)
+        if not joint.settled or 2 * (drops - len(fits) + len(fewer)) > drops:
+            return replace(joint, settled=False)
         if not fewer:
-            adjusted, budgets = dict(zip(good, joint.drops, strict=True)), Budgets(joint)
-            light = {
-                key: _joint_result(outcome[key], drop, budgets) for key, drop in adjusted.items()
-            }
-            return FittedTogether(joint, outcome | light, adjusted)
+            return joint
         for key, matched in fewer.items():
-            result, fit = outcome[key], good.pop(key)
+            result, fit = results[key], fits.pop(key)
             counts = {"matched": matched, "alone": fit.match_count}
             why = make_reason("differs_from_session", fit.model.protocol.vocabulary, **counts)
             own = result.alone or result.quantities
-            outcome[key] = replace(result, reasons=(*result.reasons, why), quantities=own)
-    return FittedTogether(None, outcome, good)
+            results[key] = replace(result, reasons=(*result.reasons, why), quantities=own)
+    return None
 
 
 def _joint_result(result: DropResult, drop: JointDrop, budgets: Budgets) -> DropResult:

@@ -10,18 +10,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from rig.analysis.components import priors
-from rig.analysis.fit import Fit
-from rig.analysis.joint_fit import JointFit
-from rig.analysis.joint_step import JointDrop
-from rig.analysis.result import DropResult, Measured
-from rig.analysis.session import Analysis, fit_together, sum_up
+from rig.analysis.session import Analysis, SessionDrops, fit_sessions
 from rig.analysis.summary import Incline, summarize
 from rig.protocol.protocol import Protocol
 from rig.reasons import rig_error
 from rig.threads import one_thread
-
-Key = tuple[int, tuple[int, int]]
-Drops = dict[Key, Fit | JointDrop]
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,28 +35,6 @@ class SessionPart:
     protocol: Protocol
     analysis: Analysis
     board: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class SessionsFit:
-    """Result of a joint fit of several sessions.
-
-    Attributes
-    ----------
-    parts
-        The sessions with their analysis from the joint fit.
-    joint
-        The joint fit; `None` if there are too few good drops.
-    pooled
-        Means over all sessions of a scene, by their names.
-    shared
-        Names of the sessions that share the owner of the key, a list for each rig.
-    """
-
-    parts: tuple[SessionPart, ...]
-    joint: JointFit | None
-    pooled: Mapping[tuple[str, ...], Sequence[Incline]]
-    shared: Mapping[str, Sequence[Sequence[str]]]
 
 
 def same_owners(
@@ -109,71 +80,56 @@ def _statements(protocol: Protocol) -> dict[str, object]:
 
 
 @one_thread
-def fit_sessions(parts: Sequence[SessionPart], *, same_rig: bool | None = None) -> SessionsFit:
+def fit_parts(
+    parts: Sequence[SessionPart], shared: Mapping[str, Sequence[Sequence[str]]]
+) -> tuple[SessionPart, ...]:
     """Fit all good drops of several sessions together.
 
     Parameters
     ----------
-    same_rig
-        As for `same_owners`.
+    shared
+        Names of the sessions that share each owner, from `same_owners`.
+
+    Returns
+    -------
+    tuple of SessionPart
+        The sessions with their analysis from the joint fit.
 
     Raises
     ------
     InputError
         The sessions' scenes are of different kinds, or their drops fit no common rig.
     """
-    first = parts[0]
     kinds = [(part.protocol.vocabulary.scene, priors(part.protocol)) for part in parts]
     for part, kind in zip(parts, kinds, strict=True):
         if kind != kinds[0]:
-            raise rig_error("sessions_unlike", path=part.name, other=first.name)
-    shared = same_owners(parts, same_rig=same_rig)
-    drops = _own(parts, shared)
-    together = fit_together(
-        {
-            (place, (member.run.number, member.attempt)): replace(
-                member, quantities=_strip_shared(member.quantities)
-            )
-            for place, part in enumerate(parts)
-            for member in part.analysis.drops
-        },
-        drops,
-    )
-    if not together.settled:
-        names = ", ".join(part.name for part in parts)
-        raise rig_error("sessions_disagree", names=names)
-    results: list[list[DropResult]] = [[] for _ in parts]
-    for (place, _), result in together.results.items():
-        results[place].append(result)
-    fitted = tuple(
-        replace(part, analysis=sum_up(part.protocol, members, part.analysis.joint))
-        for part, members in zip(parts, results, strict=True)
-    )
-    return SessionsFit(fitted, together.joint, _pool_sessions(fitted), shared)
+            raise rig_error("sessions_unlike", path=part.name, other=parts[0].name)
+    analyses = fit_sessions([_with_owners(part, shared, len(parts)) for part in parts])
+    if any(analysis.unsettled for analysis in analyses):
+        raise rig_error("sessions_disagree", names=", ".join(part.name for part in parts))
+    fitted = zip(parts, analyses, strict=True)
+    return tuple(replace(part, analysis=analysis) for part, analysis in fitted)
 
 
-def _strip_shared(quantities: Mapping[str, Measured]) -> dict[str, Measured]:
-    """Return quantities without a session's own covariances, which refer to other unknowns."""
-    return {name: replace(value, shared=None, deviation=None) for name, value in quantities.items()}
-
-
-def _own(parts: Sequence[SessionPart], shared: Mapping[str, Sequence[Sequence[str]]]) -> Drops:
-    """Return the good drops, each with the name suffixes of its session's shared unknowns."""
-    suffixes: dict[str, dict[str, str]] = {part.name: {} for part in parts}
-    for owner, groups in shared.items():
-        for group in groups:
-            # Unknowns that all sessions share keep their names.
-            suffix = "" if len(group) == len(parts) else f" ({', '.join(group)})"
-            for name in group:
-                suffixes[name][owner] = suffix
-    return {
-        (place, job): replace(fit, model=fit.model.copy_with(owners=suffixes[part.name]))
-        for place, part in enumerate(parts)
+def _with_owners(
+    part: SessionPart, shared: Mapping[str, Sequence[Sequence[str]]], count: int
+) -> SessionDrops:
+    """Return a session's drops, good ones with the name suffixes of their shared unknowns."""
+    owners = {  # unknowns that all sessions share keep their names
+        owner: "" if len(group) == count else f" ({', '.join(group)})"
+        for owner, groups in shared.items()
+        for group in groups
+        if part.name in group
+    }
+    fits = {
+        job: replace(fit, model=fit.model.copy_with(owners=owners))
         for job, fit in part.analysis.adjusted.items()
     }
+    results = {(drop.run.number, drop.attempt): drop for drop in part.analysis.drops}
+    return SessionDrops(part.protocol, results, fits)
 
 
-def _pool_sessions(parts: Sequence[SessionPart]) -> dict[tuple[str, ...], list[Incline]]:
+def pool_means(parts: Sequence[SessionPart]) -> dict[tuple[str, ...], list[Incline]]:
     """Return means over all sessions with the same predictions, by their names."""
     scenes: dict[str, list[SessionPart]] = {}
     for part in parts:

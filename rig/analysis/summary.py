@@ -9,10 +9,10 @@ from statistics import fmean, stdev
 from typing import Any, TypeVar
 
 from rig.analysis.averages import mean
+from rig.analysis.budget_lines import COMMON
 from rig.analysis.comparison import Comparison, Difference, compare
 from rig.analysis.gate_passages import GatePassage
-from rig.analysis.plain_data import attributes
-from rig.analysis.quantities import COMMON
+from rig.analysis.plain_data import Record, attributes
 from rig.analysis.result import GOOD, DropResult, Measured
 from rig.measurands import MEASURANDS, averaged
 from rig.predictions import predicted_run
@@ -23,7 +23,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
-class GateMeans:
+class GateMeans(Record):
     """Mean passage of an object through a gate, over all runs in which the gate saw it.
 
     Attributes
@@ -36,15 +36,12 @@ class GateMeans:
         Standard deviations between runs, m/s and s; `None` for a single one.
     """
 
+    MEMBERS = "*mean speed_sd_m_s=speed_sd? interval_sd_s=interval_sd? n"
+
     mean: GatePassage
     n: int
     speed_sd: float | None
     interval_sd: float | None
-
-    def json(self) -> dict[str, Any]:
-        """Return a member of ``gates`` of the summary."""
-        scatter = {"speed_sd_m_s": self.speed_sd, "interval_sd_s": self.interval_sd, "n": self.n}
-        return self.mean.json() | {name: sd for name, sd in scatter.items() if sd is not None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,22 +87,22 @@ class Incline:
         """Return a member of ``summary``."""
         fields: dict[str, Any] = {**self.condition.json(), "n": self.n}
         for name, value in self.means.items():
-            fields[name] = value.json()
+            fields[name], row = value.json(), MEASURANDS[name]
             if name in self.deviations:
-                fields[MEASURANDS[name].key("sd")] = self.deviations[name]
-                fields[MEASURANDS[name].key("se")] = self.deviations[name] / math.sqrt(self.n)
+                fields[row.key("sd")] = self.deviations[name]
+                fields[row.key("se")] = self.deviations[name] / math.sqrt(self.n)
         fields["common"] = [
             {"name": cause, "quantity": name, "u": u}
             for name, causes in self.causes.items()
             for cause, u in causes.items()
         ]
-        fields |= attributes(self, "gates") if self.gates else {}
+        fields |= attributes(self, "gates?")
         fields["predicted"] = {name: model.value for name, model in self.predicted.items()}
         fields["predicted_u"] = {name: model.u for name, model in self.predicted.items()}
-        main, *further = self.means
-        stems = {main: ""} | {name: f"_{MEASURANDS[name].stem}" for name in further}
-        errors = {f"normalized_error{stem}": name for name, stem in stems.items()}
-        return fields | {key: self.normalized_error(name) for key, name in errors.items()}
+        for number, name in enumerate(self.means):
+            stem = f"_{MEASURANDS[name].stem}" if number else ""
+            fields[f"normalized_error{stem}"] = self.normalized_error(name)
+        return fields
 
 
 def summarize(

@@ -14,7 +14,7 @@ from rig.protocol.plan import runs
 from rig.reasons import rig_error, sentences
 from rig.report.numbers import ranges
 from rig.report.templates import sentence
-from rig.results import SessionResults, calibration, check_open, protocol_of
+from rig.results.whole import SessionResults, calibration, check_open, protocol_of
 from rig.session.reading import Reader
 
 SEED = 1
@@ -52,7 +52,7 @@ def budget(
         recorded = ranges("run", (result.run.number for result in outcome.analysis.runs))
         raise rig_error("run_unrecorded", path=session.path, run=number, runs=recorded)
     protocol = protocol_of(session)
-    check_open(session, protocol)
+    check_open(session)
     planned = planned_run({run.number: run for run in runs(protocol)}, drop)
     single, fit = DropCase(protocol, planned, drop, calibration(session).scale(drop)).read()
     if fit is None:

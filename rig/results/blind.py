@@ -13,26 +13,6 @@ from dataclasses import replace
 from rig.analysis.result import DropResult
 from rig.analysis.session import Analysis
 from rig.measurands import RELEASE_SKEW
-from rig.protocol.protocol import Protocol
-from rig.reasons import rig_error
-from rig.session.reading import Reader
-
-
-def kept_back(session: Reader, protocol: Protocol) -> bool:
-    """Whether a session's results are still withheld."""
-    return protocol.blind and not session.unblinded
-
-
-def check_open(session: Reader, protocol: Protocol) -> None:
-    """Raise an error if a session's results are still withheld.
-
-    Raises
-    ------
-    SessionError
-        The session is blind.
-    """
-    if kept_back(session, protocol):
-        raise rig_error("session_blind", path=str(session.path))
 
 
 def veiled_drop(result: DropResult) -> DropResult:

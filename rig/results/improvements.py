@@ -8,7 +8,7 @@ from dataclasses import replace
 from statistics import fmean
 from typing import Any, NamedTuple
 
-from rig.analysis.quantities import BUDGET
+from rig.analysis.budget_lines import BUDGET
 from rig.analysis.summary import Incline
 from rig.measurands import Measurand, averaged
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from statistics import median
 from threading import Lock
@@ -17,15 +18,15 @@ from rig.analysis.curves import model_curves
 from rig.analysis.drop import DropCase, DropSummary
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.result import GOOD, DropResult
-from rig.analysis.session import Analysis, gather, joins, overrule, planned_run, sum_up
+from rig.analysis.session import Analysis, gather, overrule, planned_run, sum_up
 from rig.cache.entry import CacheEntry
 from rig.clock.calibration import Calibration, Calibrator, TimeScale
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Protocol, Run
 from rig.records import Drop, Job
-from rig.results.blind import kept_back, veil, veiled_drop
+from rig.results.blind import veil, veiled_drop
 from rig.results.known_drops import KnownDrops
-from rig.results.whole import SessionResults, protocol_of, rejected_drops
+from rig.results.whole import SessionResults, kept_back, protocol_of, rejected_drops
 from rig.session.drop_check import ByteReplay
 from rig.session.reading import Reader, StateEntry
 from rig.session.schema import RunState
@@ -95,13 +96,25 @@ class SessionView:
 
 
 class _Scene(NamedTuple):
-    """Protocol, plan and drop cache; `complete` once the timer's beams are known."""
+    """A protocol, its runs by number, the cache of drops, and predictions."""
 
     protocol: Protocol
     plan: dict[int, Run]
     kept: KnownDrops
     curves: dict[str, Any]
-    complete: bool
+    blind: bool
+
+
+def _scene(session: Reader) -> _Scene:
+    protocol = protocol_of(session)
+    return _plan_scene(protocol, blind=kept_back(session))
+
+
+@lru_cache(maxsize=2)  # the timer's beams are known from the first drop on
+def _plan_scene(protocol: Protocol, *, blind: bool) -> _Scene:
+    plan = {run.number: run for run in planned_runs(protocol)}
+    known = KnownDrops(protocol, blind=blind)
+    return _Scene(protocol, plan, known, model_curves(protocol), blind)
 
 
 @dataclass(slots=True)
@@ -120,10 +133,8 @@ class LiveAnalysis:
     _drops: dict[Job, Drop] = field(default_factory=dict)
     _joint_fit: tuple[object, Analysis | None] = (None, None)
     """The latest joint fit, and its drops with their verdicts and time scales."""
-    _digest: str | None = None
     _calibrator: Calibrator = field(default_factory=Calibrator)
     _replay: ByteReplay = field(default_factory=ByteReplay)
-    _scene: _Scene | None = None
     _readings: int = 0
     _lock: Lock = field(default_factory=Lock)
 
@@ -134,7 +145,7 @@ class LiveAnalysis:
 
     def clock(self, session: Reader) -> Calibration:
         """Return the calibration of the session's clock from all records so far."""
-        return self._calibrator.look(session, self._plan_scene(session).protocol.reference_u)
+        return self._calibrator.look(session, protocol_of(session).reference_u)
 
     def judge(self, session: Reader, drop: Drop) -> DropResult:
         """Return a drop's own result, as `read` does.
@@ -146,9 +157,9 @@ class LiveAnalysis:
         drop
             A drop recorded in it.
         """
-        result = self._summary(drop, self.clock(session).scale(drop)).result
-        protocol = self._plan_scene(session).protocol
-        return veiled_drop(result) if kept_back(session, protocol) else result
+        scene = _scene(session)
+        result = self._summary(scene, drop, self.clock(session).scale(drop)).result
+        return veiled_drop(result) if scene.blind else result
 
     def read(self) -> SessionView:
         """Return the session as it is now; safe in any thread, and serialized.
@@ -160,27 +171,25 @@ class LiveAnalysis:
         """
         with self._lock, Session.open(self.path, readonly=True) as session:
             with session.snapshot():
-                scene, clock = self._plan_scene(session), self.clock(session)
-                states, digest = tuple(session.states()), self._digest
+                scene, clock, digest = _scene(session), self.clock(session), None
+                states = tuple(session.states())
                 if states != self._states:  # records are only added, each with a log entry
-                    checked = session.drops(self._replay)
-                    self._drops = {Job(drop.run, drop.attempt): drop for drop in checked}
+                    self._drops = {drop.job: drop for drop in session.drops(self._replay)}
                     self._states, digest = states, session.digest()
-                causes, blind = rejected_drops(session), kept_back(session, scene.protocol)
-            drops, self._readings = self._drops, self._readings + 1
+            drops, causes = self._drops, rejected_drops(states)
             scales = {job: clock.scale(drop) for job, drop in drops.items()}
             results = {
-                job: overrule(self._summary(drop, scales[job]).result, causes.get(job))
+                job: overrule(self._summary(scene, drop, scales[job]).result, causes)
                 for job, drop in drops.items()
             }
             enough = sum(result.verdict in GOOD for result in results.values()) >= FEWEST
             members = self._members(results)
             # Look for a stored analysis of these records; that of a blind session has no values.
-            if enough and not blind and digest != self._digest and self._joint_fit[0] != members:
+            if digest and enough and not scene.blind and self._joint_fit[0] != members:
                 finished = CacheEntry(SessionResults, digest).find()
                 if finished is not None:
                     self._joint_fit = members, finished.analysis
-                self._digest = digest
+            self._readings += 1
             of, joint = self._joint_fit if enough else (None, None)
             view = SessionView(
                 path=self.path,
@@ -196,9 +205,9 @@ class LiveAnalysis:
                 curves=scene.curves,
                 clock=clock,
                 states=states,
-                blind=blind,
+                blind=scene.blind,
             )
-            return _veiled_view(view) if blind else view
+            return _veiled_view(view) if scene.blind else view
 
     def fit_jointly(self, view: SessionView) -> None:
         """Fit all drops together, as ``rig analyze`` does, for the next `read`.
@@ -210,37 +219,24 @@ class LiveAnalysis:
         view
             Result of `read`.
         """
-        drops = []
-        for job, result in view.results.items():
-            summary, drop = self._summaries[job], view.drops[job]
-            case = DropCase(view.protocol, view.plan[job.run], drop, summary.scale)
-            drops.append(case.restore_drop(summary) if joins(view.protocol, result) else None)
-        analysis = gather(view.protocol, list(view.results.values()), drops)
+        drops = [
+            (DropCase(view.protocol, view.plan[job.run], drop, summary.scale), summary)
+            for job, drop in view.drops.items()
+            for summary in (self._summaries[job],)
+        ]
+        analysis = gather(view.protocol, drops, rejected_drops(view.states))
         self._joint_fit = self._members(view.results), analysis
 
     def _members(self, results: Mapping[Job, DropResult]) -> object:
         return {job: (drop.verdict, self._summaries[job].scale.hz) for job, drop in results.items()}
 
-    def _plan_scene(self, session: Reader) -> _Scene:
-        scene = self._scene
-        if scene is None or not scene.complete:
-            protocol = protocol_of(session)
-            if scene is None or scene.protocol != protocol:
-                plan = {run.number: run for run in planned_runs(protocol)}
-                drops = KnownDrops(protocol, blind=kept_back(session, protocol))
-                scene = _Scene(protocol, plan, drops, model_curves(protocol), complete=False)
-            self._scene = scene = scene._replace(complete=bool(session.identities()))
-        return scene
-
-    def _summary(self, drop: Drop, scale: TimeScale) -> DropSummary:
+    def _summary(self, scene: _Scene, drop: Drop, scale: TimeScale) -> DropSummary:
         """Return a drop's own summary, from memory, the cache or a new analysis."""
-        scene, job = self._scene, Job(drop.run, drop.attempt)
-        assert scene is not None
-        summary = self._summaries.get(job) or scene.kept.get(drop)
+        summary = self._summaries.get(drop.job) or scene.kept.get(drop)
         if summary is None or abs(summary.scale.hz / scale.hz - 1.0) > _SAME_SCALE:
             case = DropCase(scene.protocol, planned_run(scene.plan, drop), drop, scale)
             summary = scene.kept[drop] = case.summary(summary)
-        self._summaries[job] = summary
+        self._summaries[drop.job] = summary
         return summary
 
 

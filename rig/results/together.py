@@ -8,25 +8,24 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any
+from typing import Any, Literal
 
 from rig.analysis.averages import combine
-from rig.analysis.plain_data import attributes
+from rig.analysis.plain_data import Record, attributes, plain
 from rig.analysis.result import GOOD, DropResult, Measured
 from rig.analysis.session import Analysis, Progress
-from rig.analysis.several import SessionPart, SessionsFit, fit_sessions
+from rig.analysis.several import SessionPart, fit_parts, pool_means, same_owners
 from rig.analysis.summary import Incline, good_cases
 from rig.measurands import averaged
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Condition
 from rig.reasons import rig_error
-from rig.results.blind import check_open
-from rig.results.whole import SessionResults, complete_analysis, protocol_of, results
+from rig.results.whole import SessionResults, check_open, complete_analysis, protocol_of, results
 from rig.session.reading import Reader
 
 
 @dataclass(frozen=True, slots=True)
-class MeanDifference:
+class MeanDifference(Record):
     """A session's mean less that of the reference, which is the first session.
 
     Attributes
@@ -41,17 +40,16 @@ class MeanDifference:
         The difference with its uncertainty.
     """
 
+    MEMBERS = (
+        "session reference *condition quantity *value "
+        "normalized_error=value.normalized_error budget=value.budget"
+    )
+
     quantity: str
     session: str
     reference: str
     condition: Condition
     value: Measured
-
-    def json(self) -> dict[str, Any]:
-        """Return a member of ``differences``."""
-        sessions = attributes(self, "session", "reference")
-        value = self.value.json() | attributes(self.value, "normalized_error", "budget")
-        return sessions | self.condition.json() | {"quantity": self.quantity} | value
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,12 +60,18 @@ class TogetherResults:
     ----------
     sessions
         Each session's own results, by name, in the order given.
-    fit
-        Joint fit of all sessions.
+    parts
+        The sessions with their analysis from the joint fit of all.
+    shared
+        Names of the sessions that share the owner of the key, a list for each rig.
+    pooled
+        Means over all sessions of a scene, by their names.
     """
 
     sessions: Mapping[str, SessionResults]
-    fit: SessionsFit
+    parts: tuple[SessionPart, ...]
+    shared: Mapping[str, Sequence[Sequence[str]]]
+    pooled: Mapping[tuple[str, ...], Sequence[Incline]]
 
     @property
     def simulated(self) -> bool:
@@ -77,11 +81,11 @@ class TogetherResults:
     @property
     def summary(self) -> tuple[Incline, ...]:
         """Means over the runs of all sessions of a scene."""
-        return tuple(line for summary in self.fit.pooled.values() for line in summary)
+        return tuple(line for summary in self.pooled.values() for line in summary)
 
     def analyses(self) -> list[tuple[str, Analysis]]:
         """Return the analysis of each session from the joint fit, by name."""
-        return [(part.name, part.analysis) for part in self.fit.parts]
+        return [(part.name, part.analysis) for part in self.parts]
 
     @property
     def void(self) -> bool:
@@ -90,45 +94,39 @@ class TogetherResults:
 
     def json(self) -> dict[str, Any]:
         """Return the object that ``rig analyze A B --json`` prints."""
-        joint = self.fit.joint
+        rig = self.parts[0].analysis.rig
         return {
             "simulated": self.simulated,
             "sessions": [
-                {"session": name, "simulated": item.simulated, "calibration": item.calibration}
-                for name, item in self.sessions.items()
+                {"session": name} | attributes(session, "simulated", "calibration")
+                for name, session in self.sessions.items()
             ],
-            "shared": self._shared_json(),
-            "runs": [
-                {"session": name, **run.json()}
-                for name, analysis in self.analyses()
-                for run in analysis.runs
-            ],
+            **self._shared_json(),
+            "runs": self._members("runs"),
             "summary": [
                 {"sessions": list(names), **line.json()}
-                for names, summary in self.fit.pooled.items()
+                for names, summary in self.pooled.items()
                 for line in summary
             ],
-            **({} if joint is None else {"learned": joint.json()}),
+            **({} if rig is None else attributes(rig, "learned")),
         }
-
-    def _shared_json(self) -> list[dict[str, Any]]:
-        return [
-            {"what": owner, "sessions": [list(group) for group in groups]}
-            for owner, groups in self.fit.shared.items()
-        ]
 
     def comparison_json(self) -> dict[str, Any]:
         """Return the object that ``rig compare --json`` prints."""
-        return {
-            "simulated": self.simulated,
-            "shared": self._shared_json(),
-            "means": [
-                {"session": part.name, **line.json()}
-                for part in self.fit.parts
-                for line in part.analysis.summary
-            ],
-            "differences": [difference_row.json() for difference_row in self.differences()],
-        }
+        head = {"simulated": self.simulated, **self._shared_json()}
+        return head | {"means": self._members("summary"), "differences": plain(self.differences())}
+
+    def _shared_json(self) -> dict[str, Any]:
+        shared = self.shared.items()
+        return {"shared": [{"what": owner, "sessions": plain(groups)} for owner, groups in shared]}
+
+    def _members(self, name: Literal["runs", "summary"]) -> list[dict[str, Any]]:
+        """Return runs or means of all sessions as JSON data, each with its session."""
+        return [
+            {"session": session, **member.json()}
+            for session, analysis in self.analyses()
+            for member in getattr(analysis, name)
+        ]
 
     def differences(self) -> list[MeanDifference]:
         """Return each session's means less those of the first, for conditions of both.
@@ -141,7 +139,7 @@ class TogetherResults:
         InputError
             No session has runs like those of the first.
         """
-        first, *rest = self.fit.parts
+        first, *rest = self.parts
         reference = _cases(first)
         differences = []
         for part in rest:
@@ -185,7 +183,7 @@ def results_together(
     unfinished
         Whether planned runs may be missing.
     fresh, progress
-        As for `rig.results.results`, for each session in turn.
+        As for `rig.results.whole.results`, for each session in turn.
 
     Raises
     ------
@@ -196,7 +194,7 @@ def results_together(
     own: list[SessionResults] = []
     for name, session in zip(_names(files), files, strict=True):
         protocol, path = protocol_of(session), str(session.path)
-        check_open(session, protocol)
+        check_open(session)
         outcome = results(session, progress, fresh=fresh)
         planned = len(planned_runs(protocol))
         _check_whole(path, outcome.analysis, planned, unfinished=unfinished)
@@ -205,8 +203,10 @@ def results_together(
         parts.append(SessionPart(name, protocol, analysis, str(boards[-1] if boards else "")))
         own.append(outcome)
     _check_repeats(files, own)
-    sessions = dict(zip(_names(files), own, strict=True))
-    return TogetherResults(sessions, fit_sessions(parts, same_rig=same_rig))
+    shared = same_owners(parts, same_rig=same_rig)
+    fitted = fit_parts(parts, shared)
+    sessions = {part.name: outcome for part, outcome in zip(parts, own, strict=True)}
+    return TogetherResults(sessions, fitted, shared, pool_means(fitted))
 
 
 def _names(files: Sequence[Reader]) -> list[str]:

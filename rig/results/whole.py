@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,12 @@ from rig.clock.calibration import Calibration, Calibrator, TimeScale
 from rig.protocol import reader
 from rig.protocol.measurable import with_gates
 from rig.protocol.protocol import Protocol
-from rig.reasons import Reason, notes_in
+from rig.reasons import Reason, notes_in, rig_error
 from rig.records import Drop, Job
-from rig.results.blind import check_open, kept_back, veil
+from rig.results.blind import veil
 from rig.results.improvements import improvements
 from rig.results.known_drops import KnownDrops, edges_digest
-from rig.session.reading import Reader
+from rig.session.reading import Reader, StateEntry
 from rig.session.schema import RunState
 
 _MOST_PROCESSES = 4
@@ -104,9 +105,32 @@ def protocol_of(session: Reader) -> Protocol:
 
     Timers other than our boards may have fewer beams than the protocol.
     """
-    protocol = reader.parse(session.protocol_text, session.protocol_source, kept=True)
     had = next((board["beams"] for _, board in session.identities() if "beams" in board), None)
-    return protocol if had is None else with_gates(protocol, had)
+    beams = None if had is None else tuple(had)
+    return _read_protocol(session.protocol_text, session.protocol_source, beams)
+
+
+@lru_cache(maxsize=8)
+def _read_protocol(text: str, source: str, beams: tuple[int, ...] | None) -> Protocol:
+    protocol = reader.parse(text, source, kept=True)
+    return protocol if beams is None else with_gates(protocol, beams)
+
+
+def kept_back(session: Reader) -> bool:
+    """Whether a session's results are still withheld, see `rig.results.blind`."""
+    return protocol_of(session).blind and not session.unblinded
+
+
+def check_open(session: Reader) -> None:
+    """Raise an error if a session's results are still withheld.
+
+    Raises
+    ------
+    SessionError
+        The session is blind.
+    """
+    if kept_back(session):
+        raise rig_error("session_blind", path=str(session.path))
 
 
 def calibration(session: Reader) -> Calibration:
@@ -151,11 +175,12 @@ def _analyze(session: Reader, progress: Progress | None, *, fresh: bool) -> Sess
         edges.extend([edges_digest(drop)] if drop.edges else [])
         return clock.scale(drop)
 
-    digest, blind = session.digest(), kept_back(session, protocol)
+    digest, blind = session.digest(), kept_back(session)
     clock = Calibrator().look(session, protocol.reference_u)
-    total = sum(entry.state is RunState.RECORDED for entry in session.states())
+    states = session.states()
+    total = sum(entry.state is RunState.RECORDED for entry in states)
     known = KnownDrops(protocol, blind=blind, fresh=fresh)
-    causes, arguments = rejected_drops(session), (progress, known, total, _processors())
+    causes, arguments = rejected_drops(states), (progress, known, total, _processors())
     complete = analyze(protocol, session.drops(), scale, causes, *arguments)
     analysis = veil(complete) if blind else complete
     gravity = check_gravity(protocol, analysis.runs)
@@ -185,21 +210,26 @@ def complete_analysis(
     SessionError
         The session is blind.
     """
-    check_open(session, protocol_of(session))
+    check_open(session)
     with session.snapshot():
         analysis = (known and known.complete) or _analyze(session, progress, fresh=False).complete
     assert analysis is not None
     return analysis
 
 
-def rejected_drops(session: Reader) -> dict[tuple[int, int], tuple[Reason, ...]]:
+def rejected_drops(states: Iterable[StateEntry]) -> dict[tuple[int, int], tuple[Reason, ...]]:
     """Return the causes of drops that the operator rejected, by run and attempt."""
-    last = {(entry.run, entry.attempt): entry for entry in session.states()}
-    return {key: entry.reasons for key, entry in last.items() if entry.state is RunState.REJECTED}
+    last = last_entries(states).items()
+    return {job: entry.reasons for job, entry in last if entry.state is RunState.REJECTED}
 
 
 def notes(session: Reader) -> dict[Job, str]:
     """Return the operators' latest notes on drops, in order of recording."""
-    last = {Job(entry.run, entry.attempt): entry for entry in session.states()}
-    texts = {job: " · ".join(notes_in(entry.reasons)) for job, entry in last.items()}
+    last = last_entries(session.states()).items()
+    texts = {job: " · ".join(notes_in(entry.reasons)) for job, entry in last}
     return {job: text for job, text in texts.items() if text}
+
+
+def last_entries(states: Iterable[StateEntry]) -> dict[Job, StateEntry]:
+    """Return the latest entry of each drop in the log of states."""
+    return {Job(entry.run, entry.attempt): entry for entry in states}

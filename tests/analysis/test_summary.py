@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.analysis.averages import combine, mean
+from rig.analysis.budget_lines import effective_degrees
 from rig.analysis.distributions import coverage_factor
-from rig.analysis.quantities import effective_degrees
 from rig.analysis.result import Audit, DropResult, Measured
 from rig.analysis.summary import summarize
 from rig.model.chain import Chain

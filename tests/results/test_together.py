@@ -58,8 +58,10 @@ def test_nothing_that_is_kept_is_used_where_that_is_asked_for(two, call, monkeyp
 
 
 def test_what_one_rig_shares_is_one_unknown_and_of_two_rigs_there_are_two(two):
-    one = together(*two, same_rig=True).fit.joint.shared.blocks
-    each = together(*two, same_rig=False).fit.joint.shared.blocks
+    one, each = (
+        together(*two, same_rig=same).parts[0].analysis.joint.shared.blocks
+        for same in (True, False)
+    )
     assert {"beams", "datum", "drop", "clock"} <= set(one)
     assert {f"{name} ({place}.session)" for name in one for place in "ab"} == set(each)
 
@@ -69,7 +71,7 @@ def test_errors_of_one_rig_cancel_in_the_difference_of_its_sessions(tmp_path):
     (cancelled,) = together(first, other, same_rig=True).differences()
     (whole,) = together(first, other, same_rig=False).differences()
     assert cancelled.value.budget["common"] < 0.1 * whole.value.budget["common"]
-    summary = together(first, other, same_rig=False).fit.parts
+    summary = together(first, other, same_rig=False).parts
     means = [part.analysis.summary[0].means["gravity_m_s2"] for part in summary]
     assert whole.value.value == pytest.approx(means[1].value - means[0].value)
     commons = [mean.budget["common"] for mean in means]
