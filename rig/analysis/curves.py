@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ _BEYOND = 5.0  # degrees by which curves extend beyond the outermost inclines
 _STEEPEST = 89.0
 
 
+@lru_cache(maxsize=4)
 def model_curves(protocol: Protocol) -> dict[str, Any]:
     """Predict Δz and V with their bands for every degree; empty without a surface.
 

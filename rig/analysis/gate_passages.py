@@ -37,17 +37,13 @@ class GatePassage(Record):
     interval: Measured | None
 
 
-def gate_passages(
-    fit: DropFit, drop: AdjustedDrop, measured: Callable[[Dual], Measured]
-) -> tuple[GatePassage, ...]:
+def gate_passages(fit: DropFit, measured: Callable[[Dual], Measured]) -> tuple[GatePassage, ...]:
     """Return the passage of every gate that saw the object, from the top down.
 
     Parameters
     ----------
     fit
         Fit of the drop.
-    drop
-        The same drop with its unknowns.
     measured
         Function that returns a result for a value with its derivatives.
 
@@ -56,7 +52,7 @@ def gate_passages(
     tuple of GatePassage
         Empty for chains, whose rods pass a gate many times, and for a striking object.
     """
-    model = fit.model
+    model, drop = fit.model, AdjustedDrop(fit.model, fit.x)
     if not model.protocol.one_object or "free" not in model.records:
         return ()
     gates = model.protocol.gates
@@ -69,10 +65,12 @@ def gate_passages(
     passages: list[GatePassage] = []
     before: Dual | None = None
     for n, gate in sorted(enumerate(gates.gates), key=lambda numbered: -numbered[1].height):
-        when, speed = moment(drop, gate) if n in seen else (None, None)
-        if when is not None and speed is not None:
-            interval = None if before is None else measured(when - before)
-            passages.append(GatePassage(gate.channel, gate.height, measured(speed), interval))
+        if n not in seen:
+            before = None
+            continue
+        when, speed = moment(drop, gate)
+        interval = None if before is None else measured(when - before)
+        passages.append(GatePassage(gate.channel, gate.height, measured(speed), interval))
         before = when
     return tuple(passages)
 

@@ -19,7 +19,7 @@ from rig.analysis.equations import standardise
 from rig.analysis.evidence import STATED_WEIGHT
 from rig.analysis.fit import Fit, count_matched
 from rig.analysis.plain_data import Record
-from rig.analysis.result import GOOD, DropResult, Measured
+from rig.analysis.result import DropResult, Measured, good_runs
 from rig.analysis.square_root import square_root
 from rig.analysis.unknowns import ANY_GRAVITY
 from rig.measurands import GRAVITY
@@ -84,15 +84,9 @@ def check_gravity(protocol: Protocol, results: Iterable[DropResult]) -> GravityC
     GravityCheck or None
         `None` if no free chain passes gates.
     """
-    gravities = [
-        gravity
-        for result in results
-        if result.verdict in GOOD
-        and (gravity := result.quantities.get(GRAVITY.name, result.gravity)) is not None
-    ]
-    if not gravities:
-        return None
-    return GravityCheck(mean(gravities), protocol.gravity, len(gravities))
+    values = [run.quantities.get(GRAVITY.name, run.gravity) for run in good_runs(results)]
+    measured = [value for value in values if value is not None]
+    return GravityCheck(mean(measured), protocol.gravity, len(measured)) if measured else None
 
 
 def free_gravity(fit: Fit) -> Measured | None:

@@ -45,6 +45,15 @@ def attributes(result: object, *members: str) -> dict[str, Any]:
     return fields
 
 
+def spread(budgets: Mapping[str, Mapping[str, float]]) -> list[dict[str, Any]]:
+    """Return the contributions of sources to quantities as JSON data, by quantity and source."""
+    return [
+        {"name": source, "quantity": quantity, "u": u}
+        for quantity, budget in budgets.items()
+        for source, u in budget.items()
+    ]
+
+
 def plain(value: Any) -> Any:
     """Return a value as JSON data; results by their `json`, non-finite numbers as `None`."""
     if hasattr(value, "json"):

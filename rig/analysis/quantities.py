@@ -28,12 +28,12 @@ def measurands(model: DropModel, x: Array) -> dict[str, Dual]:
     return {name: value for name, value in values if value is not None}
 
 
-class _Strike(NamedTuple):
-    """Strike of the top rod: height above the contact level, time and speed."""
+class Arrival(NamedTuple):
+    """Arrival of the top rod at a height above the contact level, m: speed, m/s, and time, s."""
 
-    above: Dual
-    when: Dual
     speed: Dual
+    when: Dual
+    above: Dual | float = 0.0
 
 
 @dataclass(frozen=True)
@@ -132,19 +132,11 @@ class AdjustedDrop:
         """Gain of speed of the top rod by a late last pull, m/s."""
         return self.linear("late", self.model.discrepancy.late_pull)
 
-    @property
-    def speed(self) -> Dual:
-        """Speed V of the top rod at the contact level, m/s."""
-        return self._arrival[0]
-
-    @property
-    def hit(self) -> Dual:
-        """Time at which the top rod passes the contact level, s."""
-        return self._arrival[1]
-
     @cached_property
-    def _arrival(self) -> tuple[Dual, Dual]:
-        """V and its time, from the path and first-order corrections.
+    def arrival(self) -> Arrival:
+        """Arrival of the top rod's middle at the contact level, with V.
+
+        This is the path with first-order corrections.
 
         The top rod is ahead of its place by w and faster than its chain by w′: it arrives
         e = w/(V + w′) earlier, and slower by g·e. A late pull acts over the distance below the
@@ -157,7 +149,7 @@ class AdjustedDrop:
         early = self.ahead("impact", level)[0] / fast
         speed = fast - self.gravity * early
         later = 0.5 * self.model.discrepancy.late_way * self.late / (speed * speed)
-        return speed + self.late, hit - early - later
+        return Arrival(speed + self.late, hit - early - later)
 
     @cached_property
     def skew(self) -> Dual:
@@ -165,21 +157,21 @@ class AdjustedDrop:
         return self.release("free") - self.release("impact")
 
     @cached_property
-    def strike(self) -> _Strike | None:
+    def strike(self) -> Arrival | None:
         """Strike of the top rod, a ballistic leg away from the contact level.
 
         `None` without impacts, or if the strike is higher than the speed at the level allows.
         """
         if not self.strikes:
             return None
-        speed, contact = self.speed, self.model.protocol.contact
+        (speed, hit, _), contact = self.arrival, self.model.protocol.contact
         above = contact.strike.value + self.linear("contact") + self.linear("strike")
         kappa = Dual(self._path("impact").kappa, self.linear("drag").slopes)
         squared = speed * speed - 2.0 * above * (self.gravity - kappa * speed * speed)
         if squared.value <= 0.0:
             return None
         end = squared.root()
-        return _Strike(above, self.hit - 2.0 * above / (speed + end), end)
+        return Arrival(end, hit - 2.0 * above / (speed + end), above)
 
     def apart(self, when: Dual) -> Dual:
         """Return the height of the free chain's top rod above the contact point at `when`, m."""
@@ -196,17 +188,19 @@ def _acceleration(drop: AdjustedDrop, *, track: bool) -> Dual | None:
 COMPUTED: dict[str, Callable[[AdjustedDrop], Dual | None]] = {
     # The free chain is read after the same time since its own release as the striking chain. No
     # model of its later fall is needed.
-    "separation_m": lambda drop: drop.apart(drop.hit + drop.skew) if drop.both else None,
-    "separation_raw_m": lambda drop: drop.apart(drop.hit) if drop.both else None,
+    "separation_m": lambda drop: drop.apart(drop.arrival.when + drop.skew) if drop.both else None,
+    "separation_raw_m": lambda drop: drop.apart(drop.arrival.when) if drop.both else None,
     "separation_strike_m": lambda drop: (
         drop.apart(drop.strike.when + drop.skew) - drop.strike.above
         if drop.both and drop.strike
         else None
     ),
     "release_skew_s": lambda drop: drop.skew if drop.both else None,
-    "speed_m_s": lambda drop: drop.speed if drop.strikes else None,
+    "speed_m_s": lambda drop: drop.arrival.speed if drop.strikes else None,
     "speed_strike_m_s": lambda drop: drop.strike.speed if drop.strike else None,
-    "fall_time_s": lambda drop: drop.hit - drop.release("impact") if drop.strikes else None,
+    "fall_time_s": lambda drop: (
+        drop.arrival.when - drop.release("impact") if drop.strikes else None
+    ),
     "gravity_m_s2": partial(_acceleration, track=False),
     "acceleration_m_s2": partial(_acceleration, track=True),
 }

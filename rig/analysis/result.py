@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rig.analysis.distributions import coverage_factor
-from rig.analysis.plain_data import Record
+from rig.analysis.plain_data import Record, spread
 from rig.reasons import Reason, reasons_json, rig_error
+from rig.records import Job
 
 if TYPE_CHECKING:  # results are shown, and predictions made, where no drop is analysed
     import numpy as np
@@ -217,6 +218,11 @@ class DropResult(Record):
     gravity: Measured | None = None
 
     @property
+    def job(self) -> Job:
+        """Run and attempt."""
+        return Job(self.run.number, self.attempt)
+
+    @property
     def matches(self) -> dict[int, int]:
         """Rod of each matched edge, by the edge's number in the drop."""
         return {n: rod for n, rod in enumerate(self.rods) if rod >= 0}
@@ -244,8 +250,16 @@ class DropResult(Record):
     @property
     def budget(self) -> list[dict[str, Any]]:
         """Contribution of each source to each quantity."""
-        return [
-            {"name": source, "quantity": name, "u": u}
-            for name, value in self.quantities.items()
-            for source, u in value.budget.items()
-        ]
+        return spread({name: value.budget for name, value in self.quantities.items()})
+
+
+def good_runs(results: Iterable[DropResult], *, rejected: bool = False) -> list[DropResult]:
+    """Return the results of good drops.
+
+    Parameters
+    ----------
+    rejected
+        Whether to include drops that are good by their limits but were rejected by the operator.
+    """
+    verdicts = [(result, result.limits if rejected else None) for result in results]
+    return [result for result, limits in verdicts if {result.verdict, limits} & {*GOOD}]

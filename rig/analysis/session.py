@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
-from operator import length_hint
-from typing import NamedTuple, TypeVar
+from functools import lru_cache
+from operator import attrgetter, length_hint
+from typing import NamedTuple
 from typing import Protocol as Interface
 
 from rig.analysis.budgets import Budgets
@@ -26,15 +27,15 @@ from rig.protocol.measurable import check_gates, check_measurable
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Protocol, Run
 from rig.reasons import Reason, make_reason, rig_error
-from rig.records import Drop
+from rig.records import Drop, Job
 from rig.threads import one_thread
 
 Progress = Callable[[int, int], None]
 Causes = Mapping[tuple[int, int], Sequence[Reason]]
 """Causes by run and attempt, for drops that the operator rejected."""
 
-K = TypeVar("K")
-
+Key = tuple[int, Job]
+"""A session's place, and a drop of it."""
 _EXPLAINED = 6  # void drops of a session for which set-up faults are searched
 KEPT = 0.9
 """Least share of its matched edges that a drop must keep in the joint fit: with fewer, its result
@@ -87,7 +88,7 @@ class Analysis(Record):
     summary: tuple[Incline, ...]
     rig: RigEstimate | None = None
     joint: JointFit | None = field(default=None, compare=False)
-    adjusted: Mapping[tuple[int, int], Fit | JointDrop] = field(default_factory=dict, compare=False)
+    adjusted: Mapping[Job, Fit | JointDrop] = field(default_factory=dict, compare=False)
     effects: tuple[Effects, ...] = ()
     with_rejected: tuple[Incline, ...] = ()
     unsettled: bool = False
@@ -95,8 +96,7 @@ class Analysis(Record):
     @property
     def drops(self) -> list[DropResult]:
         """All attempts at all runs, by run and attempt."""
-        drops = (*self.runs, *self.superseded)
-        return sorted(drops, key=lambda drop: (drop.run.number, drop.attempt))
+        return sorted((*self.runs, *self.superseded), key=attrgetter("job"))
 
     @property
     def damaged(self) -> tuple[DropResult, ...]:
@@ -106,7 +106,7 @@ class Analysis(Record):
     @property
     def damage(self) -> list[str]:
         """A line that counts and names the damaged drops; empty if there are none."""
-        names = "; ".join(f"run {drop.run.number}, attempt {drop.attempt}" for drop in self.damaged)
+        names = "; ".join(str(drop.job) for drop in self.damaged)
         count = f"{len(self.damaged)} of {len(self.drops)} drops"
         line = f"damaged records, left out: {count} ({names}); see rig recover SESSION"
         return [line] if names else []
@@ -125,14 +125,14 @@ class SessionDrops(NamedTuple):
     protocol
         The scene and its plan.
     results
-        Result of each drop, by run and attempt.
+        Result of each drop.
     fits
-        Those that take part in a joint fit.
+        Fits of those that take part in a joint fit, by run and attempt.
     """
 
     protocol: Protocol
-    results: Mapping[tuple[int, int], DropResult]
-    fits: Mapping[tuple[int, int], DropFit]
+    results: Iterable[DropResult]
+    fits: Mapping[Job, DropFit]
 
 
 @one_thread
@@ -174,14 +174,11 @@ def analyze(
     """
     check_gates(protocol)
     check_measurable(protocol)
-    planned = {run.number: run for run in planned_runs(protocol)}
     known: SummaryByDrop = {} if summaries is None else summaries
-    total = length_hint(drops) if total is None else total
+    total = total or length_hint(drops)
 
     def summarize_drops() -> Generator[tuple[DropCase, DropSummary]]:
-        cases = (
-            DropCase(protocol, planned_run(planned, drop), drop, scale(drop)) for drop in drops
-        )
+        cases = (drop_case(protocol, drop, scale(drop)) for drop in drops)
         tasks = ((case, known.get(case.drop)) for case in cases)
         analysed, unexplained = do_in_order(_summarize, tasks, total, processes), 0
         for done, ((case, before), first) in enumerate(analysed, 1):
@@ -207,24 +204,31 @@ def _summarize(task: tuple[DropCase, DropSummary | None]) -> DropSummary:
     return case.summary(before, explain=False)
 
 
-def planned_run(planned: Mapping[int, Run], drop: Drop) -> Run:
-    """Return the planned run of a drop.
+@lru_cache(maxsize=8)
+def plan_of(protocol: Protocol) -> Mapping[int, Run]:
+    """Return the planned runs by number."""
+    return {run.number: run for run in planned_runs(protocol)}
+
+
+def drop_case(protocol: Protocol, drop: Drop, scale: TimeScale) -> DropCase:
+    """Return a drop with its planned run.
 
     Raises
     ------
     InputError
         The plan has no run of this number.
     """
+    planned = plan_of(protocol)
     if drop.run not in planned:
         if drop.damage:  # the damage may be in its number
             raise rig_error("record_damaged", text=f"run {drop.run}: {drop.damage}")
         raise rig_error("run_not_planned", run=drop.run, planned=len(planned))
-    return planned[drop.run]
+    return DropCase(protocol, planned[drop.run], drop, scale)
 
 
 def overrule(result: DropResult, rejected: Causes) -> DropResult:
     """Return a drop's result, rejected if the operator rejected the drop."""
-    causes = rejected.get((result.run.number, result.attempt))
+    causes = rejected.get(result.job)
     if causes is None:
         return result
     reasons = (*causes, *result.reasons)
@@ -246,78 +250,64 @@ def gather(
     rejected
         Causes by run and attempt, for drops that the operator rejected.
     """
-    results, fits = dict[tuple[int, int], DropResult](), dict[tuple[int, int], DropFit]()
+    results, fits = [], dict[Job, DropFit]()
     for case, summary in drops:
-        result = results[case.drop.job] = overrule(summary.result, rejected)
+        result = overrule(summary.result, rejected)
+        results.append(result)
         if result.verdict in GOOD or nearly_in_time(result, protocol.accept.release_skew):
             fit = case.restore_drop(summary)
-            fits |= {} if fit is None else {case.drop.job: fit}
+            fits |= {} if fit is None else {result.job: fit}
     return fit_sessions([SessionDrops(protocol, results, fits)])[0]
 
 
-def fit_sessions(sessions: Sequence[SessionDrops]) -> list[Analysis]:
-    """Fit the drops of sessions together, and summarize each session.
+def fit_sessions(parts: Sequence[SessionDrops]) -> list[Analysis]:
+    """Fit the drops of sessions together, and return the analysis of each session.
 
     A verdict depends on the drop alone, by limits fixed beforehand. The joint fit changes values,
     and a verdict only where the drop alone cannot decide whether the release skew is within its
     limit.
     """
-    results = {(n, job): one for n, s in enumerate(sessions) for job, one in s.results.items()}
-    fits = {(n, job): fit for n, s in enumerate(sessions) for job, fit in s.fits.items()}
-    joint = _fit_jointly(results, fits)
-    settled = joint if joint is not None and joint.settled else None
-    if settled is not None:
-        budgets = Budgets(settled)
-        for key, drop in zip(fits, settled.drops, strict=True):
+    results = {(n, result.job): result for n, part in enumerate(parts) for result in part.results}
+    fits = {(n, job): fit for n, part in enumerate(parts) for job, fit in part.fits.items()}
+    joint, settled = _fit_jointly(results, fits)
+    if joint is not None:
+        budgets = Budgets(joint)
+        for key, drop in zip(fits, joint.drops, strict=True):
             fits[key], results[key] = drop, _joint_result(results[key], drop, budgets)
     analyses = []
-    for n, session in enumerate(sessions):
-        own = {job: result for (place, job), result in results.items() if place == n}
+    for n, part in enumerate(parts):
+        own = [results[key] for key in results if key[0] == n]
         adjusted = {
             job: fit if isinstance(fit, JointDrop) else alone(fit)
             for (place, job), fit in fits.items()
-            if place == n and own[job].verdict in GOOD
+            if place == n and results[place, job].verdict in GOOD
         }
-        analysis = sum_up(session.protocol, own.values(), settled, adjusted)
-        analyses.append(replace(analysis, unsettled=joint is not settled))
+        analysis = sum_up(part.protocol, own, joint)
+        analyses.append(replace(analysis, adjusted=adjusted, unsettled=not settled))
     return analyses
 
 
 def sum_up(
-    protocol: Protocol,
-    results: Iterable[DropResult],
-    joint: JointFit | None = None,
-    adjusted: Mapping[tuple[int, int], Fit | JointDrop] | None = None,
+    protocol: Protocol, results: Iterable[DropResult], joint: JointFit | None = None
 ) -> Analysis:
-    """Return the analysis of a session from the results of its drops.
-
-    Parameters
-    ----------
-    protocol
-        The scene and its plan.
-    results
-        Result of each drop.
-    joint, adjusted
-        As in `Analysis`.
-    """
-    ordered = sorted(results, key=lambda result: (result.run.number, result.attempt))
+    """Return the analysis of a session from the results of its drops, and perhaps a joint fit."""
+    ordered = sorted(results, key=attrgetter("job"))
     last = {result.run.number: result for result in ordered}
     latest = tuple(last.values())
+    earlier = tuple(result for result in ordered if last[result.run.number] is not result)
     spared = any(result.limits in GOOD for result in latest)
+    with_rejected = summarize(protocol, latest, rejected=True) if spared else ()
+    summary, paired = summarize(protocol, latest), effects(protocol, latest)
+    rig = None if joint is None else joint.rig
     return Analysis(
-        latest,
-        tuple(result for result in ordered if last[result.run.number] is not result),
-        tuple(summarize(protocol, latest)),
-        None if joint is None else joint.rig,
-        joint,
-        adjusted or {},
-        effects(protocol, latest),
-        tuple(summarize(protocol, latest, rejected=True)) if spared else (),
+        latest, earlier, summary, rig, joint, effects=paired, with_rejected=with_rejected
     )
 
 
-def _fit_jointly(results: dict[K, DropResult], fits: dict[K, DropFit]) -> JointFit | None:
-    """Fit drops together; `None` if there are too few.
+def _fit_jointly(
+    results: dict[Key, DropResult], fits: dict[Key, DropFit]
+) -> tuple[JointFit | None, bool]:
+    """Fit drops together: the joint fit, if there is one, and whether no fit failed.
 
     A drop that loses matched edges in the joint fit is taken out of `fits`, with a reason in
     `results`, and keeps its own values.
@@ -332,16 +322,16 @@ def _fit_jointly(results: dict[K, DropResult], fits: dict[K, DropFit]) -> JointF
         }
         # If most drops are left out, the fit has failed, not the drops.
         if not joint.settled or 2 * (drops - len(fits) + len(fewer)) > drops:
-            return replace(joint, settled=False)
+            return None, False
         if not fewer:
-            return joint
+            return joint, True
         for key, matched in fewer.items():
             result, fit = results[key], fits.pop(key)
             counts = {"matched": matched, "alone": fit.match_count}
             why = make_reason("differs_from_session", fit.model.protocol.vocabulary, **counts)
             own = result.alone or result.quantities
             results[key] = replace(result, reasons=(*result.reasons, why), quantities=own)
-    return None
+    return None, True
 
 
 def _joint_result(result: DropResult, drop: JointDrop, budgets: Budgets) -> DropResult:

@@ -8,20 +8,18 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
 from pathlib import Path
 from statistics import median
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import Any
 
 from rig.analysis.curves import model_curves
-from rig.analysis.drop import DropCase, DropSummary
+from rig.analysis.drop import DropSummary
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.result import GOOD, DropResult
-from rig.analysis.session import Analysis, gather, overrule, planned_run, sum_up
+from rig.analysis.session import Analysis, drop_case, gather, overrule, plan_of, sum_up
 from rig.cache.entry import CacheEntry
 from rig.clock.calibration import Calibration, Calibrator, TimeScale
-from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Protocol, Run
 from rig.records import Drop, Job
 from rig.results.blind import veil, veiled_drop
@@ -36,8 +34,33 @@ _SAME_SCALE = 5e-6
 """Relative change of the tick rate below which a drop is not analysed again: 50 nm in 10 mm."""
 
 
-@dataclass(frozen=True, slots=True)
-class SessionView:
+@dataclass(frozen=True)
+class _Scene:
+    """A session's protocol with what follows from it.
+
+    Attributes
+    ----------
+    plan
+        Planned runs by number.
+    curves
+        Predictions against inclination from `rig.analysis.curves.model_curves`.
+    blind
+        Whether measured values are withheld.
+    """
+
+    protocol: Protocol
+    plan: Mapping[int, Run]
+    curves: Mapping[str, Any]
+    blind: bool
+
+    @property
+    def kept(self) -> KnownDrops:
+        """Cache of the drops' own summaries."""
+        return KnownDrops(self.protocol, blind=self.blind)
+
+
+@dataclass(frozen=True)
+class SessionView(_Scene):
     """A session as it is on disk, with its results.
 
     Attributes
@@ -50,26 +73,18 @@ class SessionView:
         Analysis of the latest joint fit; before the first, summary of all drops by themselves.
     lagging
         Whether a new joint fit is due, as drops have changed since that of `analysis`.
-    curves
-        Predictions against inclination from `rig.analysis.curves.model_curves`.
-    blind
-        Whether measured values are withheld.
     """
 
     path: Path
     reading: int
-    protocol: Protocol
     simulated: bool
-    plan: Mapping[int, Run]
     drops: Mapping[Job, Drop]
     results: Mapping[Job, DropResult]
     scales: Mapping[Job, TimeScale]
     analysis: Analysis
     lagging: bool
-    curves: Mapping[str, Any]
     clock: Calibration
     states: tuple[StateEntry, ...]
-    blind: bool
 
     @property
     def jobs(self) -> tuple[Job, ...]:
@@ -95,26 +110,9 @@ class SessionView:
         return () if gates is None else tuple(gate.channel for gate in gates.gates)
 
 
-class _Scene(NamedTuple):
-    """A protocol, its runs by number, the cache of drops, and predictions."""
-
-    protocol: Protocol
-    plan: dict[int, Run]
-    kept: KnownDrops
-    curves: dict[str, Any]
-    blind: bool
-
-
 def _scene(session: Reader) -> _Scene:
     protocol = protocol_of(session)
-    return _plan_scene(protocol, blind=kept_back(session))
-
-
-@lru_cache(maxsize=2)  # the timer's beams are known from the first drop on
-def _plan_scene(protocol: Protocol, *, blind: bool) -> _Scene:
-    plan = {run.number: run for run in planned_runs(protocol)}
-    known = KnownDrops(protocol, blind=blind)
-    return _Scene(protocol, plan, known, model_curves(protocol), blind)
+    return _Scene(protocol, plan_of(protocol), model_curves(protocol), kept_back(session))
 
 
 @dataclass(slots=True)
@@ -192,20 +190,17 @@ class LiveAnalysis:
             self._readings += 1
             of, joint = self._joint_fit if enough else (None, None)
             view = SessionView(
+                **vars(scene),
                 path=self.path,
                 reading=self._readings,
-                protocol=scene.protocol,
                 simulated=session.simulated,
-                plan=scene.plan,
                 drops=drops,
                 results=results,
                 scales=scales,
                 analysis=joint or sum_up(scene.protocol, results.values()),
                 lagging=enough and of != members,
-                curves=scene.curves,
                 clock=clock,
                 states=states,
-                blind=scene.blind,
             )
             return _veiled_view(view) if scene.blind else view
 
@@ -219,11 +214,10 @@ class LiveAnalysis:
         view
             Result of `read`.
         """
-        drops = [
-            (DropCase(view.protocol, view.plan[job.run], drop, summary.scale), summary)
-            for job, drop in view.drops.items()
-            for summary in (self._summaries[job],)
-        ]
+        pairs = ((drop, self._summaries[job]) for job, drop in view.drops.items())
+        drops = (
+            (drop_case(view.protocol, drop, summary.scale), summary) for drop, summary in pairs
+        )
         analysis = gather(view.protocol, drops, rejected_drops(view.states))
         self._joint_fit = self._members(view.results), analysis
 
@@ -234,7 +228,7 @@ class LiveAnalysis:
         """Return a drop's own summary, from memory, the cache or a new analysis."""
         summary = self._summaries.get(drop.job) or scene.kept.get(drop)
         if summary is None or abs(summary.scale.hz / scale.hz - 1.0) > _SAME_SCALE:
-            case = DropCase(scene.protocol, planned_run(scene.plan, drop), drop, scale)
+            case = drop_case(scene.protocol, drop, scale)
             summary = scene.kept[drop] = case.summary(summary)
         self._summaries[drop.job] = summary
         return summary

@@ -22,7 +22,7 @@ from rig.reasons import Reason, notes_in, rig_error
 from rig.records import Drop, Job
 from rig.results.blind import veil
 from rig.results.improvements import improvements
-from rig.results.known_drops import KnownDrops, edges_digest
+from rig.results.known_drops import KnownDrops
 from rig.session.reading import Reader, StateEntry
 from rig.session.schema import RunState
 
@@ -40,8 +40,6 @@ class SessionResults:
         Analysis of all drops; without values if the session is blind.
     time_scales
         Calibration of each drop, by run and attempt.
-    edges
-        Digest of the edges of each drop that has any.
     gravity
         Check of gravity by the free chain; `None` if there is no suitable chain.
     simulated
@@ -58,7 +56,6 @@ class SessionResults:
 
     analysis: Analysis
     time_scales: Mapping[tuple[int, int], Mapping[str, Any]]
-    edges: tuple[str, ...]
     gravity: GravityCheck | None
     simulated: bool
     clock: Calibration
@@ -166,25 +163,21 @@ def results(
 
 def _analyze(session: Reader, progress: Progress | None, *, fresh: bool) -> SessionResults:
     """Return the results of a session by a new analysis, with its joint fit."""
-    protocol = protocol_of(session)
+    protocol, clock, states = protocol_of(session), calibration(session), session.states()
     scales: dict[tuple[int, int], Mapping[str, Any]] = {}
-    edges: list[str] = []
 
     def scale(drop: Drop) -> TimeScale:
-        scales[drop.run, drop.attempt] = clock.describe(drop)
-        edges.extend([edges_digest(drop)] if drop.edges else [])
+        scales[drop.job] = clock.describe(drop)
         return clock.scale(drop)
 
     digest, blind = session.digest(), kept_back(session)
-    clock = Calibrator().look(session, protocol.reference_u)
-    states = session.states()
     total = sum(entry.state is RunState.RECORDED for entry in states)
     known = KnownDrops(protocol, blind=blind, fresh=fresh)
     causes, arguments = rejected_drops(states), (progress, known, total, _processors())
     complete = analyze(protocol, session.drops(), scale, causes, *arguments)
     analysis = veil(complete) if blind else complete
     gravity = check_gravity(protocol, analysis.runs)
-    outcome = analysis, scales, tuple(edges), gravity, session.simulated, clock, blind, digest
+    outcome = analysis, scales, gravity, session.simulated, clock, blind, digest
     return SessionResults(*outcome, None if blind else complete)
 
 

@@ -80,7 +80,7 @@ def test_the_first_reading_of_a_session_whose_results_are_kept_has_them_all(sess
     assert view.results == cold.results
     assert not view.analysis.with_rejected
     for job in view.jobs:
-        pairs = [compare(one.protocol, [[one.results[job]]]) for one in (view, cold)]
+        pairs = [compare(one.protocol, [one.results[job]]) for one in (view, cold)]
         assert pairs[0] == pairs[1]
 
 

@@ -7,10 +7,9 @@ import shutil
 import pytest
 
 import rig as door
-from rig.analysis.several import SessionPart, same_owners
 from rig.errors import InputError, SessionError
 from rig.protocol import reader
-from rig.results.together import results_together
+from rig.results.together import SessionPart, results_together, same_owners
 from rig.session.store import Session
 from tests.cli.conftest import call  # noqa: F401 - a fixture
 from tests.cli.lab import PROTOCOLS, record
@@ -82,15 +81,16 @@ def test_of_one_rig_only_what_is_stated_alike_is_shared():
     text = (PROTOCOLS / "inclined-uniform.yaml").read_text("utf-8")
     moved = re.sub(r"height: 22 mm", "height: 23 mm", text, count=1)
     assert moved != text
-    parts = [SessionPart(name, reader.parse(t), None) for name, t in (("a", text), ("b", moved))]
+    stated = reader.parse(text)
+    parts = [SessionPart(*part, None, None) for part in (("a", stated), ("b", reader.parse(moved)))]
     owners = same_owners(parts, same_rig=None)
     assert owners["beams"] == [["a"], ["b"]]
     assert owners["posts"] == owners["chain A"] == owners["start"] == [["a", "b"]]
     titled = reader.parse(text.replace("title: ", "title: Other "))
-    parts[1] = SessionPart("b", titled, None)
+    parts[1] = SessionPart("b", titled, None, None)
     assert same_owners(parts, same_rig=None)["posts"] == [["a"], ["b"]]
     assert same_owners(parts, same_rig=True)["posts"] == [["a", "b"]]
-    parts[1] = SessionPart("b", parts[0].protocol, None, board="another")
+    parts[1] = SessionPart("b", stated, None, None, board="another")
     assert same_owners(parts, same_rig=None)["posts"] == [["a"], ["b"]]
 
 
