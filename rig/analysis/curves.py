@@ -6,8 +6,6 @@ import math
 from functools import lru_cache
 from typing import Any
 
-import numpy as np
-
 from rig.analysis.distributions import coverage_factor
 from rig.measurands import SEPARATION, SPEED
 from rig.predictions import predict_incline
@@ -30,12 +28,11 @@ def model_curves(protocol: Protocol) -> dict[str, Any]:
     if surface is None:
         return {}
     inclines = protocol.plan.inclines
-    low = max(0.0, min(inclines) - _BEYOND)
-    high = min(_STEEPEST, max(inclines) + _BEYOND)
-    points = set(np.arange(low, high + 0.5, 1.0).tolist())
+    low, high = max(0.0, min(inclines) - _BEYOND), min(_STEEPEST, max(inclines) + _BEYOND)
+    points = {low + degrees for degrees in range(math.ceil(high + 0.5 - low))}
     if surface.pile is not None and low < surface.pile.below_deg <= high:
         edge = surface.pile.below_deg
-        points |= {edge, float(np.nextafter(edge, 0.0))}
+        points |= {edge, math.nextafter(edge, 0.0)}
     predictions = [
         (struck, predict_incline(protocol, incline, struck))
         for struck in protocol.strikers

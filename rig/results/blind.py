@@ -8,26 +8,17 @@ all code that shows results.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from rig.analysis.result import DropResult
 from rig.analysis.session import Analysis
 from rig.measurands import RELEASE_SKEW
 
 
 def veiled_drop(result: DropResult) -> DropResult:
-    """Return a drop's result without measured values."""
-    shown_names = {RELEASE_SKEW.name} & result.quantities.keys()
-    return replace(
-        result,
-        quantities={name: result.quantities[name] for name in shown_names},
-        rods=(),
-        unmatched=(),
-        last_passages={},
-        gates=(),
-        alone={},
-        gravity=None,
-    )
+    """Return what may be seen of a drop's result: all but measured values."""
+    drop = result.run, result.attempt, result.verdict, result.reasons, result.audit
+    skews = {name: m for name, m in result.quantities.items() if name == RELEASE_SKEW.name}
+    scatter, limits, damaged = result.scatter, result.limits, result.damaged
+    return DropResult(*drop, skews, scatter=scatter, limits=limits, damaged=damaged)
 
 
 def veil(analysis: Analysis) -> Analysis:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.analysis.gravity import GravityCheck, check_gravity
+from rig.analysis.plain_data import attributes, plain
 from rig.analysis.session import Analysis, Progress, analyze
 from rig.analysis.summary import Incline
 from rig.cache.entry import CacheEntry
@@ -88,13 +89,11 @@ class SessionResults:
 
     def json(self) -> dict[str, Any]:
         """Return the object that `rig analyze --json` prints."""
-        fields = self.analysis.json()
+        head = attributes(self, "simulated", "clock=clock.details", "blind?", "calibration")
+        fields = head | self.analysis.json()
         for run in (*fields["runs"], *fields.get("superseded", [])):
             run["calibration"] = self.time_scales[run["run"], run["attempt"]]
-        head = {"simulated": self.simulated, "clock": self.clock.details}
-        head |= {"blind": True} if self.blind else {}
-        better = [improvement.json() for improvement in improvements(self.analysis.summary)]
-        return head | {"calibration": self.calibration} | fields | {"measure_next": better}
+        return fields | {"measure_next": plain(improvements(self.summary))}
 
 
 def protocol_of(session: Reader) -> Protocol:
