@@ -34,8 +34,8 @@ from rig.reasons import rig_error
 from rig.report.numbers import ranges, with_unit
 from rig.report.parts import means_parts, summary_table
 from rig.report.templates import parts_html
-from rig.results import SessionResults, calibration, protocol_of, results
 from rig.results.together import MeanDifference, TogetherResults, results_together
+from rig.results.whole import SessionResults, calibration, protocol_of, results
 from rig.session.store import Session
 
 __all__ = [

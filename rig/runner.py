@@ -25,8 +25,8 @@ from rig.recorder.interrupts import Interrupts
 from rig.recorder.run_lines import plan_lines
 from rig.records import Job
 from rig.report.templates import sentence
-from rig.results import SessionResults, results
 from rig.results.live import LiveAnalysis
+from rig.results.whole import SessionResults, results
 from rig.session.schema import RunState
 from rig.session.store import Session
 
