@@ -93,7 +93,7 @@ def test_a_drop_that_falls_is_in_the_file_before_it_ends(processes, driver):
 
 def test_a_drop_that_only_the_board_has_is_waited_for(processes, driver):
     driver.fire(driver.arm(1, 1))
-    processes.hand("pull 4")
+    processes.hand("pull 2")
     driver.close()
     ended(processes)
     assert states(processes) == [(1, 1, "armed"), (1, 1, "fired"), (1, 1, "recorded")]
