@@ -156,8 +156,9 @@ class ProcessFixture:
                         stream.close()
 
     def fill_disk(self) -> None:
-        """Let the session's log grow no further, as on a full disk."""
-        self._limit_files((self.folder / "session-wal").stat().st_size)
+        """Let what is written of the session grow no further, as on a full disk."""
+        files = [*self.folder.glob("session-*")] or [*self.folder.glob("session*")]
+        self._limit_files(max(file.stat().st_size for file in files))
 
     def free_disk(self) -> None:
         """Make room again."""
