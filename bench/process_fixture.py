@@ -157,8 +157,7 @@ class ProcessFixture:
 
     def fill_disk(self) -> None:
         """Let what is written of the session grow no further, as on a full disk."""
-        files = [*self.folder.glob("session-*")] or [*self.folder.glob("session*")]
-        self._limit_files(max(file.stat().st_size for file in files))
+        self._limit_files(max(file.stat().st_size for file in self.folder.glob("session-*")))
 
     def free_disk(self) -> None:
         """Make room again."""

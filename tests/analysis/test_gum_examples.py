@@ -58,31 +58,3 @@ def test_impedance():
     scale = np.sqrt(np.diag(whole))
     correlations = (whole / np.outer(scale, scale))[[0, 0, 1], [1, 2, 2]]
     np.testing.assert_allclose(correlations, [-0.588, -0.485, 0.993], atol=6e-4)
-
-
-def test_thermometer():
-    """H.3: corrections of a thermometer, a line through eleven of them, read at 30 °C."""
-    t = np.array([
-        21.521, 22.012, 22.512, 23.003, 23.507, 23.999, 24.513, 25.002, 25.503, 26.010, 26.511,
-    ])  # fmt: skip
-    b = -np.array([0.171, 0.169, 0.166, 0.159, 0.164, 0.165, 0.156, 0.157, 0.159, 0.161, 0.160])
-    slopes = np.column_stack([np.ones(11), t - 20.0])
-    sd, scatter = np.array([10.0, 10.0]), 0.0035
-    for _ in range(2):  # the scatter is that of the residuals themselves
-        found = least_squares(
-            lambda y, _, s=scatter: plain_equations((slopes @ y - b) / s, slopes / s),
-            sd,
-            np.zeros(2),
-        )
-        scatter = float(np.linalg.norm(slopes @ found.x - b)) / math.sqrt(11 - 2)
-    assert scatter == pytest.approx(0.0035, abs=5e-5)
-    assert found.x == pytest.approx([-0.1712, 0.00218], abs=5e-5)
-    u = [u_of(found, row) for row in np.eye(2)]
-    assert u == pytest.approx([0.0029, 0.00067], rel=0.02)
-    correlation = (found.inverse @ found.inverse.T)[0, 1] / math.sqrt(
-        (found.inverse @ found.inverse.T)[0, 0] * (found.inverse @ found.inverse.T)[1, 1]
-    )
-    assert correlation == pytest.approx(-0.930, abs=6e-4)
-    at = np.array([1.0, 10.0])
-    assert float(at @ found.x) == pytest.approx(-0.1494, abs=6e-5)
-    assert u_of(found, at) == pytest.approx(0.0041, abs=6e-5)
