@@ -266,15 +266,6 @@ def test_a_signal_waits_only_while_something_falls():
             client.call(method)
 
 
-def test_a_protocol_without_gates_is_refused_and_leaves_no_session(tmp_path):
-    protocol, session = tmp_path / "g.yaml", tmp_path / "session"
-    before, _, after = FENCE.partition("gates:")
-    protocol.write_text(before + after[after.index("release:") :].replace("RUNS", "1"), "utf-8")
-    with pytest.raises(InputError, match="has no gates, so nothing can be measured"):
-        Controller("sim://", PublishedState()).open_session(str(protocol), str(session))
-    assert not session.exists()
-
-
 def test_a_session_that_is_closed_is_shown_to_nobody_any_more(tmp_path):
     protocol = tmp_path / "fence.yaml"
     protocol.write_text(FENCE.replace("RUNS", "1"), "utf-8")
