@@ -62,7 +62,7 @@ class DropModel:
         The same for drops that differ only in their edges.
     owners
         Suffixes of the names of shared unknowns, by owner, if the drops of a joint fit come from
-        different rigs: see `rig.analysis.several`.
+        different rigs: see `rig.results.together`.
     """
 
     def __init__(

@@ -90,7 +90,8 @@ def test_a_chain_arrives_when_its_top_rod_does(block):
     x[model.unknowns["alpha"]] = model.alpha
     x[model.unknowns[block]] = 1e-3
     drop = AdjustedDrop(model, x)
-    moment = Dual(np.array([drop.hit.value]), drop.hit.slopes[None])
+    hit = drop.arrival.when
+    moment = Dual(np.array([hit.value]), hit.slopes[None])
     off = abs(drop.ahead("impact", level).value[0])
     assert off > 0.5e-3
     assert abs(drop.top("impact", drop.levels("impact", moment))[0].value) < 0.01 * off
