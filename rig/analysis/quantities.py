@@ -9,11 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.analysis.air import lags, slack
-from rig.analysis.discrepancy import STRETCHES
+from rig.analysis.departures import STRETCHES, lags, lever, slack
 from rig.analysis.drop_model import DropModel
 from rig.analysis.dual import Dual
-from rig.analysis.swing import lever
 from rig.analysis.trajectory import Trajectory
 from rig.arrays import Array
 

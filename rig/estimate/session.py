@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rig.analysis.air import prior_air
 from rig.analysis.averages import by_case
 from rig.analysis.comparison import Comparison, compare
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import GOOD, Measured, good_runs
-from rig.analysis.unknowns import SharedUnknowns
+from rig.analysis.unknowns import SharedUnknowns, prior_air
 from rig.estimate import coefficients as of
 from rig.estimate.alphas import SingleAlphas, single_alphas
 from rig.estimate.curves import DropCurves, drop_curves

@@ -10,15 +10,14 @@ import pytest
 
 from bench.studies.falls import Asked, falls
 from bench.studies.time_scales import time_scale
-from rig.analysis.air import lags
 from rig.analysis.chain_records import chain_records
+from rig.analysis.departures import lags, strike_shifts
 from rig.analysis.drop import DropCase
 from rig.analysis.drop_model import DropModel
 from rig.analysis.dual import Dual
 from rig.analysis.gravity import free_gravity
 from rig.analysis.quantities import AdjustedDrop
 from rig.analysis.session import analyze
-from rig.analysis.swing import strike_shifts
 from rig.protocol.plan import runs as planned
 from tests.analysis.drops import PROTOCOLS, SCENES, case, true_value
 from tests.analysis.sessions import MILD
