@@ -145,17 +145,13 @@ class FileReading:
         return hash((*self.runs, *(tuple(column.tolist()) for column in columns)))
 
     @property
-    def is_whole(self) -> bool:
-        """Whether beams are clear at the beginning, and in the end, as a protocol has them.
+    def begins_clear(self) -> bool:
+        """Whether a beam is clear at the beginning, as a protocol has them.
 
-        Where the file says when they are blocked, it is not doubted.
+        Where the file says when beams are blocked, it is not doubted.
         """
         run = np.repeat(self.runs, np.diff(self.places))
-        _, first, counts = np.unique(
-            run * 100 + self.channel, return_index=True, return_counts=True
-        )
-        if self.layout.dark.startswith("turns"):
-            return not np.any(counts % 2)
+        _, first = np.unique(run * 100 + self.channel, return_index=True)
         return self.layout.dark not in {"high", "low"} or bool(np.any(self.blocked[first]))
 
 
@@ -254,11 +250,12 @@ def _pauses(file: TimerFile, layout: FileLayout) -> list[float]:
     of half a second or more that is three times as long as the one before.
     """
     changes, drop, _ = group_changes(file, layout.unit, layout.groups, 0.0)
-    ticks = changes["tick"].tolist() if not np.any(drop) else []
-    pauses = sorted(b - a for a, b in itertools.pairwise(ticks))
+    ticks, is_same = changes["tick"], np.diff(drop) == 0
+    pauses = sorted(np.diff(ticks)[is_same].tolist()) if not file.has_runs else []
     for before, pause in itertools.pairwise(pauses):
         if pause >= max(_CLEAR_PAUSE * before, TICK_HZ / 2):
-            return [0.0, pause / TICK_HZ][ticks[-1] - ticks[0] > _LONGEST_S * TICK_HZ :]
+            is_long = not np.any(drop) and ticks[-1] - ticks[0] > _LONGEST_S * TICK_HZ
+            return [0.0, pause / TICK_HZ][is_long:]
     return [0.0]
 
 

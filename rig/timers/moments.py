@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import date
 from decimal import ROUND_HALF_EVEN, Context
 from fractions import Fraction
 
@@ -17,7 +16,7 @@ _EXACT = Context(prec=100, rounding=ROUND_HALF_EVEN)
 
 
 def moment(text: str, power: int = 0) -> int | None:
-    """Read a time as picoseconds: a number, perhaps with its unit, or a date with its time of day.
+    """Read a time as picoseconds: a number, perhaps with its unit, or a time of day.
 
     Parameters
     ----------
@@ -31,22 +30,12 @@ def moment(text: str, power: int = 0) -> int | None:
     """
     if text[-1:] == "s" and (timed := form("timed").fullmatch(text)):
         text, power = timed[1].replace(",", "."), POWERS[unit_of(timed[2])]
-    match = form("clock").fullmatch(text) if ":" in text else None
-    if match is None:
+    if ":" not in text or (match := form("clock").fullmatch(text)) is None:
         return picoseconds(text, -power)
-    first, mark, second, third, hours, minutes, rest = match.groups()
-    day, ticks = 0, picoseconds(rest.replace(",", ".")) or 0
-    if first:
-        # Only how many days lie between two times matters: which part is the year is enough.
-        parts = [int(first), int(second), int(third)]
-        year, month, of_month = parts if len(first) > 2 else parts[::-1]
-        if mark == "/" and parts[0] <= 12:
-            month, of_month = parts[0], parts[1]
-        try:
-            day = date(year, month, of_month).toordinal()
-        except ValueError:
-            return None
-    return ((day * 24 + int(hours or 0)) * 60 + int(minutes)) * 60 * TICK_HZ + ticks
+    # Only how far apart times of a drop are matters: not the day.
+    hours, minutes, rest = match.groups("0")
+    ticks = picoseconds(rest.replace(",", ".")) or 0
+    return (60 * int(hours) + int(minutes)) * 60 * TICK_HZ + ticks
 
 
 def picoseconds(text: str, power: int = 0) -> int | None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import itertools
 import re
+import string
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -107,10 +108,11 @@ class RowBlock:
 
     def find_inputs(self, count: int) -> list[str]:
         """Return names of inputs without a heading: those of a row that lists as many."""
-        texts = ([x.rpartition(":")[2] for x in r.texts] for r in [*self.remarks, *self.headings])
-        labels = ([vocabulary.find_label(text, "gate") for text in row] for row in texts)
-        named = ([*filter(None, row)] for row in labels)
-        return next((names for names in named if len(names) == count), [])
+        for row in [*self.remarks, *self.headings]:
+            labels = [vocabulary.find_label(text.rpartition(":")[2], "gate") for text in row.texts]
+            if len(named := [*filter(None, labels)]) == count:
+                return named
+        return [*string.ascii_uppercase]  # for a number may be taken for that of a gate
 
 
 class Row(NamedTuple):
@@ -195,8 +197,8 @@ class Table:
             values = dict(_named_values(line))
             return [values.get(name, "") for name in self._names] if any(values) else [line]
         cells = split_cells(line, self.separator, len(self._usual))
-        if form("plain row").fullmatch(line) and "," not in line and "--" not in line:  # as most
-            return cells
+        if form("plain row").fullmatch(line) and (self.separator == "," or "," not in line):
+            return cells  # as most
         missing, has_comma = vocabulary.words()["missing"], form("decimal comma").fullmatch
         cells = ["" if text[:5].casefold() in missing else text for text in cells]
         return [text.replace(",", ".") if has_comma(text[:LONGEST]) else text for text in cells]
