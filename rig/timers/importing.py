@@ -117,7 +117,7 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
     readings, stated = _find_readings(options, gates, bars)
     reading, match = readings[0], FallMatch(0.0)
     if not options.as_read:
-        readings = [reading for reading in readings if reading.begins_clear] or readings
+        readings = [reading for reading in readings if reading.is_whole] or readings
         reading, match = _choose(readings, place, fit, stated)
         _refuse_impossible(reading, place, is_stated="groups" in stated)
     notes = [*reading.file.notes, _account(reading, options)]

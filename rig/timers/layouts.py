@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from rig.arrays import Index
-from rig.records import Drop, Edge
+from rig.records import Drop
 from rig.timers.edge_rows import make_drop
 from rig.timers.moments import TICK_HZ
 from rig.timers.signals import STATES, Changes
@@ -131,7 +131,7 @@ class FileReading:
         """Return the n-th drop."""
         part = slice(*self.places[n : n + 2])
         columns = (x[part].tolist() for x in (self.tick, self.channel, self.blocked))
-        return make_drop(self.runs[n], list(map(Edge, *columns)))
+        return make_drop(self.runs[n], zip(*columns, strict=True))
 
     @property
     def lasting(self) -> list[int]:
@@ -145,13 +145,15 @@ class FileReading:
         return hash((*self.runs, *(tuple(column.tolist()) for column in columns)))
 
     @property
-    def begins_clear(self) -> bool:
-        """Whether a beam is clear at the beginning, as a protocol has them.
+    def is_whole(self) -> bool:
+        """Whether beams are clear at the beginning, and in the end, as a protocol has them.
 
-        Where the file says when beams are blocked, it is not doubted.
+        Where the file says when they are blocked, it is not doubted.
         """
-        run = np.repeat(self.runs, np.diff(self.places))
-        _, first = np.unique(run * 100 + self.channel, return_index=True)
+        run = np.repeat(self.runs, np.diff(self.places)) * 100 + self.channel
+        _, first, counts = np.unique(run, return_index=True, return_counts=True)
+        if self.layout.dark.startswith("turns"):
+            return not np.any(counts % 2)
         return self.layout.dark not in {"high", "low"} or bool(np.any(self.blocked[first]))
 
 
@@ -228,28 +230,27 @@ def find_layouts(
     for values in itertools.product(*choices.values()):
         layout = FileLayout(**dict(zip(choices, values, strict=True)))
         maps = [stated["channels"]] if "channels" in stated else _channels(file, gates, layout)
-        pauses = [float(stated["pause_s"])] if "pause_s" in stated else _pauses(file, layout)
+        pauses = _pauses(file, layout.unit, layout.groups)
+        pauses = [float(stated["pause_s"])] if "pause_s" in stated else pauses
         for channels, pause in itertools.product(maps, pauses):
             yield replace(layout, channels=channels, pause_s=pause)
 
 
 def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
-    """Return how changes may be put into runs; those of rows first where times begin anew."""
-    groups = ["runs", *["unsorted"] * file.is_stacked]
-    if file.is_wide:
-        is_anew = np.any(np.diff(file.changes["tick"]) < 0)
-        groups = ["rows", "columns", *groups] if is_anew else [*groups, "rows", "columns"]
+    """Return how changes may be put into runs."""
+    groups = ["runs", *["unsorted"] * file.is_stacked, *["rows", "columns"] * file.is_wide]
     is_wire = len(file.labels) < 2 and bars == 1 and len(gates) > 1
     return groups + ["passing"] * is_wire
 
 
-def _pauses(file: TimerFile, layout: FileLayout) -> list[float]:
+@lru_cache(4)
+def _pauses(file: TimerFile, unit: str, groups: str) -> list[float]:
     """Return the pause, s, at which drops one after the other are parted, if there may be any.
 
     Between drops nothing passes for far longer than within one: of the pauses in order, the first
     of half a second or more that is three times as long as the one before.
     """
-    changes, drop, _ = group_changes(file, layout.unit, layout.groups, 0.0)
+    changes, drop, _ = group_changes(file, unit, groups, 0.0)
     ticks, is_same = changes["tick"], np.diff(drop) == 0
     pauses = sorted(np.diff(ticks)[is_same].tolist()) if not file.has_runs else []
     for before, pause in itertools.pairwise(pauses):

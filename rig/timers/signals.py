@@ -77,11 +77,11 @@ class SignalReader:
         self.sparse = {
             n for n, x in enumerate(self.signals) if len(values) > 1 and x.value.role != "moment"
         }
-        self.is_sampled = is_filled and not used.isdisjoint(SAMPLED)
+        self.is_sampled = "volts" in used or ("level" in used and is_filled)
         self.is_whole = is_filled and (self.is_sampled or len(values) > len(self.clocks))
         needed = {at for x in self.signals for at in (x.clock.at, x.value.at, *x[-2:])}
-        rest = (column for column in columns if column.role != "index")
-        self.unused = ", ".join(column.name for column in rest if column.at not in needed)
+        unused = (x.name for x in columns if x.role != "index" and x.at not in needed)
+        self.unused = ", ".join(unused)
         file.notes += [make_reason("columns_unused", columns=self.unused)] if self.unused else []
         file.lines += [f"  {column.name}: {column.meaning}" for column in columns]
         runs = [clock.run for clock in self.clocks]
@@ -96,9 +96,9 @@ class SignalReader:
         """
         file, first = self.file, next(rows)
         base = (0.0, 1.0) if self.has_times else first.block.find_time_base()
-        if self.is_sampled and base is None:
+        if base is None:
             file.problems.refuse(first.line, 1, "no_rate", lacks="a column of times or a rate")
-        self.base, self.count = base or (0.0, 1.0), 0
+        self.base, self.count = base, 0
         self.starts, self.latest = dict[int, int](), dict[int, int]()
         self.values, self.keys = dict[int, tuple[int, ...]](), set[tuple[int, ...]]()
         self.changes, self.samples = list[Any](), [array("d") for _ in self.signals]

@@ -241,10 +241,11 @@ class Table:
 
     def _is_row(self, row: Row) -> bool:
         """Whether it has values only, and at least a number or a date, or looks as if it had."""
+        if _shape(row.texts) == self._usual:  # as most
+            return True
         # Above rows of several cells may stand a date, or a count.
         is_data = len(row.texts) >= self._fewest and any(map(is_measured, row.texts))
-        is_data &= all(map(kinds_of, filter(None, row.texts)))
-        if is_data or _shape(row.texts) == self._usual:
+        if is_data and all(map(kinds_of, filter(None, row.texts))):
             return True
         # One of data with a fault: some of it is a number, as in those above, or below their names.
         above = (x.texts for x in row.block.headings if len(x.texts) == x.known)
