@@ -159,6 +159,7 @@ def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
     """Decide between roles that columns may have by those that others have."""
     there = {column.role for column in columns}
     meant = {"elapsed": "duration" if "time" in there else "time"}
+    meant |= {"level": "state"} if "state" in there else {}  # the same, without a name
     meant |= {"level": "volts"} if "volts" in there else {}  # those that are 0 at first
     # Two that may be the same two are one each; of others, falls cannot decide.
     unclear = [column for column in columns if "|" in column.role]
@@ -183,7 +184,8 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
     texts = (bare, *(row.cell(n) for row in reversed(block.headings) if row.has_units))
     units = list(map(vocabulary.unit_of, texts))
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
-    labels = (find_label(text, "gate") for text in (name, *(r.cell(n) for r in block.headings)))
+    above = (_cell_above(row, n) for row in block.headings if row is not heading)
+    labels = (find_label(text, "gate") for text in (name, *above))
     rows = (row for row in block.headings if form("row of numbers").fullmatch(row.raw))
     column.gate = next(filter(None, (*labels, *(row.cell(n) for row in rows))), "")
     named = {
@@ -209,6 +211,13 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
         if {"all.count", "far"} <= facts and column.power in {3, 6}:
             column.wrap = 2**32 * TICK_HZ // 10**column.power
     return column
+
+
+def _cell_above(row: Row, n: int) -> str:
+    """Return the cell of a row above the heading; of merged cells only the first has a text."""
+    is_grouped = sum(bool(find_label(text, "gate")) for text in row.texts) > 1
+    cells = row.texts[: n + 1] if is_grouped else [row.cell(n)]
+    return next(filter(None, reversed(cells)), "")
 
 
 def _facts_of_values(texts: Sequence[str]) -> set[str]:

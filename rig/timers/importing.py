@@ -229,7 +229,7 @@ def _account(reading: FileReading, options: Namespace) -> Reason:
     file, used = reading.file, {*reading.line.tolist()}
     # A level that changes may be of an input that is no gate.
     changed = file.changes["line"][~file.changes["first"]]
-    left = set() if file.is_sampled else {*changed.tolist()} - used
+    left = set() if file.is_sampled else ({*changed.tolist()} - used) | reading.dropped
     unused = sorted({*file.unread, *left})
     counts = {"runs": len(reading.runs), "rows": file.rows, "edges": len(reading.line)}
     if not unused:
@@ -247,6 +247,9 @@ def _some(lines: Sequence[int]) -> str:
 def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]:
     """Yield what is taken to be so, and what the file lacks."""
     file, layout, channels = reading.file, reading.layout, reading.layout.channels
+    if reading.renamed:
+        runs = ", ".join(f"{name} is run {n}" for name, n in reading.renamed.items())
+        yield make_reason("runs_renamed", runs=runs)
     if layout.pause_s:
         yield make_reason("several_drops", drops=len(reading.runs), pause_s=layout.pause_s)
     if file.period:

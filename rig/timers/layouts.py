@@ -87,6 +87,10 @@ class FileReading:
         Inputs whose first row is a beam that is blocked, at the beginning or by a change.
     line, tick, channel, blocked
         Of each edge: the line that it comes from, its time, ps, its gate, and the state after it.
+    dropped
+        Lines of changes at inputs that are no gate.
+    renamed
+        Runs that the file calls otherwise: its name, and the number here.
     """
 
     def __init__(self, file: TimerFile, layout: FileLayout) -> None:
@@ -113,9 +117,14 @@ class FileReading:
         self.firsts = [[*file.names][n] for n in np.unique(changes["label"][is_odd])]
         is_change = ~changes["first"] | (blocked & (is_late | (layout.first == "change")))
         is_edge = is_change & (channel >= 0)
-        drops, places = np.unique(drop[is_edge], return_inverse=True)
+        self.dropped = {*changes["line"][is_change & ~is_edge].tolist()}
+        drops, first, places = np.unique(drop[is_edge], return_index=True, return_inverse=True)
         runs = numbers[drops]
-        runs = np.where(runs > 0, runs, runs.max(initial=0) + np.cumsum(runs == 0))[places]
+        runs = np.where(runs > 0, runs, runs.max(initial=0) + np.cumsum(runs == 0))
+        names = np.array([*file.names])[changes["run"][is_edge][first]]
+        called = zip(names.tolist(), runs.tolist(), strict=True)
+        self.renamed = {name: n for name, n in called if name and number_of(name) != n}
+        runs = runs[places]
         order = np.flatnonzero(is_edge)[np.argsort(runs, kind="stable")]
         self.line, self.tick = changes["line"][order], changes["tick"][order]
         self.channel, self.blocked = channel[order], blocked[order]
@@ -183,9 +192,12 @@ def group_changes(
         is_late = np.diff(changes["tick"], prepend=0) >= round(pause_s * TICK_HZ)
         drops += np.cumsum(is_late & (np.diff(drops, prepend=-1) == 0))
     _, starts = np.unique(drops, return_index=True)
-    numbers = np.array([number_of(name) or 0 for name in file.names])[changes["run"][starts]]
+    named = np.array([-1 if (n := number_of(x)) is None else n for x in file.names])
+    numbers = named[changes["run"][starts]]
+    numbers += np.any(numbers == 0)  # a file may count its runs from 0
     _, known = np.unique(numbers, return_index=True)
-    return changes, drops, np.where(np.isin(np.arange(len(numbers)), known), numbers, 0)
+    is_first = np.isin(np.arange(len(numbers)), known)
+    return changes, drops, np.where(is_first, np.maximum(numbers, 0), 0)
 
 
 def count_before(keys: Index) -> Index:
@@ -261,7 +273,10 @@ def _pauses(file: TimerFile, unit: str, groups: str) -> list[float]:
 
 
 def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list[dict[str, int]]:
-    """Return which gate each input may be: by its number, or in the order of their passages."""
+    """Return which gate each input may be: by its number, in their order, or in that of passages.
+
+    Inputs may be numbered from another number than channels, or have letters.
+    """
     labels = input_names(file, layout.groups, gates)
     if layout.groups == "passing":
         return [dict(zip(labels, gates, strict=True))]
@@ -271,6 +286,8 @@ def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list
     later = file.changes[~file.changes["first"]][::-1]
     first = dict(zip(later["label"].tolist(), later["tick"], strict=True))
     passed = sorted(labels, key=lambda label: first.get(file.names[label], 0))
-    chosen = itertools.combinations(gates, len(labels))
-    maps = [dict(zip(passed, beams, strict=True)) for beams in chosen]
-    return maps[:_MOST_MAPS] or [by_number] * bool(by_number)
+    numbered = sorted(labels, key=lambda label: (number_of(label) or 0, label))
+    chosen = [*itertools.combinations(gates, len(labels))][:_MOST_MAPS]
+    maps = [dict(zip(numbered, sorted(beams), strict=True)) for beams in chosen[:1]]
+    maps += [dict(zip(passed, beams, strict=True)) for beams in chosen]
+    return maps or [by_number] * bool(by_number)
