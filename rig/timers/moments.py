@@ -10,6 +10,8 @@ from rig.timers.vocabulary import POWERS, form, is_number, unit_of
 TICK_HZ = 10**12
 LONGEST_PS = 10**33
 """A time of day in nanoseconds since 1970, if it is taken for seconds, is shorter."""
+_SHORT = 20
+"""Characters of a number that is far less than that."""
 LONGEST_S = 86400
 """How long a recording may be: more means a wrong unit."""
 _EXACT = Context(prec=100, rounding=ROUND_HALF_EVEN)
@@ -40,6 +42,10 @@ def moment(text: str, power: int = 0) -> int | None:
 
 def picoseconds(text: str, power: int = 0) -> int | None:
     """Read a decimal number of 10^power s as picoseconds, ties to even; `None` for another text."""
+    whole, _, part = text.partition(".")
+    places = 12 + power - len(part)
+    if len(text) < _SHORT and places >= 0 and text.isascii() and (whole + part).isdecimal():
+        return int(whole + part + "0" * places)  # as most, in half the time
     if not is_number(text):
         return None
     number = _EXACT.scaleb(_EXACT.create_decimal(text), 12 + power)
