@@ -18,7 +18,7 @@ _EXACT = Context(prec=100, rounding=ROUND_HALF_EVEN)
 
 
 def moment(text: str, power: int = 0) -> int | None:
-    """Read a time as picoseconds: a number, perhaps with its unit, or a time of day.
+    """Read a time as picoseconds: a number, perhaps with its unit, or a date with its time of day.
 
     Parameters
     ----------
@@ -34,10 +34,15 @@ def moment(text: str, power: int = 0) -> int | None:
         text, power = timed[1].replace(",", "."), POWERS[unit_of(timed[2])]
     if ":" not in text or (match := form("clock").fullmatch(text)) is None:
         return picoseconds(text, -power)
-    # Only how far apart times of a drop are matters: not the day.
-    hours, minutes, rest = match.groups("0")
+    first, mark, second, third, hours, minutes, rest = match.groups("0")
+    parts = [int(first), int(second), int(third)]
+    year, month, day = parts if len(first) > 2 else parts[::-1]
+    if mark == "/" and parts[0] <= 12:
+        month, day = parts[:2]
+    # Days have to be apart and in order only: months may all have 31.
+    hour = ((year * 12 + month) * 31 + day) * 24 + int(hours)
     ticks = picoseconds(rest.replace(",", ".")) or 0
-    return (60 * int(hours) + int(minutes)) * 60 * TICK_HZ + ticks
+    return (60 * hour + int(minutes)) * 60 * TICK_HZ + ticks
 
 
 def picoseconds(text: str, power: int = 0) -> int | None:
