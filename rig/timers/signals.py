@@ -154,7 +154,8 @@ class SignalReader:
         signal, names, block = self.signals[n], self.file.names, row.block
         value = signal.value
         if value.role == "volts" and is_number(word):
-            self.samples[n].extend((row.line, tick - self._origin, float(word)))
+            offset = tick - self.starts[signal.clock.at]
+            self.samples[n].extend((row.line, offset, float(word)))
             return
         state = code_of(value.role, word or value.state)
         if state == _REJECTED:
@@ -175,14 +176,10 @@ class SignalReader:
                 (row.line, tick, 0, state, key[-1], run, clock, block.number, is_first)
             )
 
-    @property
-    def _origin(self) -> int:
-        """The first time, ps."""
-        return next(iter(self.starts.values()))
-
     def _find_crossings(self, n: int) -> Changes:
         """Return where volts cross the middle; note how many do, or that nothing passes."""
-        label, samples = self.signals[n].label, np.array(self.samples[n]).reshape(-1, 3)
+        label, start = self.signals[n].label, self.starts.get(self.signals[n].clock.at, 0)
+        samples = np.array(self.samples[n]).reshape(-1, 3)
         volts = samples[:, 2]
         if (threshold := find_threshold(volts)) is None:
             limits = {"low": min(volts, default=0), "high": max(volts, default=0)}
@@ -193,7 +190,7 @@ class SignalReader:
         self.file.notes.append(make_reason("crossings", input=label, **counts))
         changes = np.zeros(len(lines), CHANGE)
         changes["line"], changes["state"] = lines, STATES.index("low") + is_high
-        changes["tick"] = [self._origin + round(offset) for offset in offsets.tolist()]
+        changes["tick"] = [start + round(offset) for offset in offsets.tolist()]
         changes["label"] = self.file.names.setdefault(label, len(self.file.names))
         return changes
 

@@ -191,14 +191,20 @@ class Table:
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
 
-    def split(self, line: str) -> list[str]:
-        """Split a line into cells; numbers get a decimal point, and what is missing is empty."""
+    def split(self, line: str, *, is_plain: bool = False) -> list[str]:
+        """Split a line into cells; numbers get a decimal point, and what is missing is empty.
+
+        Parameters
+        ----------
+        is_plain
+            Whether it has only numbers and what parts them.
+        """
         if not self.separator:
             values = dict(_named_values(line))
             return [values.get(name, "") for name in self._names] if any(values) else [line]
         cells = split_cells(line, self.separator, len(self._usual))
-        if form("plain row").fullmatch(line) and (self.separator == "," or "," not in line):
-            return cells  # as most
+        if is_plain and (self.separator == "," or "," not in line):
+            return cells
         missing, has_comma = vocabulary.words()["missing"], form("decimal comma").fullmatch
         cells = ["" if text[:5].casefold() in missing else text for text in cells]
         return [text.replace(",", ".") if has_comma(text[:LONGEST]) else text for text in cells]
@@ -211,7 +217,7 @@ class Table:
             if not line.strip():
                 continue
             if block.width and is_plain(line):  # as most
-                yield Row(number, self.split(line), line, block)
+                yield Row(number, self.split(line, is_plain=True), line, block)
                 continue
             mark = form("remark").match(line[:LONGEST])
             text = line[mark.end() :].rstrip('" ') if mark else line
