@@ -5,8 +5,9 @@ from typing import Any
 from rig.analysis.result import Measured
 from rig.analysis.video import video_fall
 from rig.cache.entry import recall
-from rig.commands.output import Arguments, print_results, progress, show, tell_damage
+from rig.commands.output import Arguments, print_results, progress, say, show, tell_damage
 from rig.measurands import acceleration_in
+from rig.reasons import make_reason
 from rig.report.parts import scatter_parts, tables
 from rig.report.templates import lines
 from rig.results.whole import SessionResults, complete_analysis, results
@@ -20,7 +21,9 @@ def main(arguments: Arguments) -> int:
         from rig.commands.compare import analyze_together  # noqa: PLC0415 - only for several
 
         return analyze_together(arguments)
-    track = None if arguments.video is None else read_video(arguments.video)
+    track = read_video(arguments.video) if arguments.video else None
+    if track and track.unused:
+        say(make_reason("track_unused", rows=track.unused).text)
     with Session.open(arguments.session, readonly=True) as session:
         outcome = results(session, progress, fresh=arguments.fresh)
         if arguments.budget is not None:
@@ -31,8 +34,9 @@ def main(arguments: Arguments) -> int:
         members: dict[str, Any] = {}
         if arguments.priors:
             members["prior_sensitivity"] = _sensitivity(session, outcome, fresh=arguments.fresh)
-    shown = None if outcome.blind else track
-    video = shown and video_fall(*shown, _by_gates(outcome))
+    video = None
+    if track and not outcome.blind:
+        video = video_fall(*track[:3], _by_gates(outcome))
     if video is not None:
         members["video"] = video.json()
     code = print_results(outcome, as_json=arguments.json, **members)

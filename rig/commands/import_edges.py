@@ -54,8 +54,7 @@ def main(arguments: Arguments) -> None:
         raise refusal("--session", "no_session_file")
     timer: dict[str, object] = {"source": "imported edges", "file": events}
     if imported.channels:
-        beams = sorted(set(imported.channels.values()))
-        timer |= {"beams": beams, **reasons_json(imported.notes)}
+        timer |= {"beams": sorted({*imported.channels.values()}), **reasons_json(imported.notes)}
     timer["sha256"] = hashlib.sha256(Path(arguments.events).read_bytes()).hexdigest()
     if arguments.clock_uncertainty is not None:
         timer["clock_u"] = arguments.clock_uncertainty
@@ -87,8 +86,8 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
     near, expected, evidence, gravity = 0, 0, 0.0, list[float]()
     shares, results = [(1.0, 0)], list[DropResult]()
     rate = TimeScale(TICK_HZ, RESONATOR_TOLERANCE)
-    compared = [n for n, run in enumerate(reading.runs) if run in planned]
-    compared = compared[: None if exact else _COMPARED]
+    most = None if exact else _COMPARED
+    compared = [n for n, run in enumerate(reading.runs) if run in planned][:most]
     places, lasting = reading.places, reading.lasting
     order = sorted(compared, key=lambda n: (places[n + 1] - places[n], lasting[n]))
     for n in sorted({*order[:: 1 + len(order) // _MOST], *order[-1:]}):
@@ -117,9 +116,8 @@ def _check_plan(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:
     gates = check_gates(protocol)
     check_measurable(protocol)
     planned = len(runs(protocol))
-    strangers = sorted({drop.run for drop in drops if drop.run > planned})
-    if strangers:
-        raise refusal(source, "run_not_planned", run=strangers[0], planned=planned)
+    if run := min((drop.run for drop in drops if drop.run > planned), default=0):
+        raise refusal(source, "run_not_planned", run=run, planned=planned)
     edges = (edge for drop in drops for edge in drop.edges)
     if idle := sorted({edge.channel for edge in edges if not gates.mask >> edge.channel & 1}):
         say(make_reason("channels_unused", channels=", ".join(map(str, idle))).text)

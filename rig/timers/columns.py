@@ -7,16 +7,15 @@ Facts are collected of each column (of its heading, its unit, its values), and t
 from __future__ import annotations
 
 import itertools
-import string
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from operator import attrgetter
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.timers import vocabulary
+from rig.timers.moments import TICK_HZ
 from rig.timers.vocabulary import POWERS, SYMBOLS, find_label, form, is_number, normal, words
 
 if TYPE_CHECKING:
@@ -30,8 +29,10 @@ VALUES = (SAMPLED, ("state", "cleared"), ("edge",))
 _MOST_COLUMNS = 200
 _NOWHERE = sys.maxsize
 """Of a column that there is not."""
-_FEWEST_TIMES = 4
-"""Columns of numbers without a heading that are times side by side, as programs print lists."""
+_FORMS = "whole", "bit", "count", "fraction", "stamp"
+"""Kinds of cells, beside those that `rig.timers.vocabulary.kinds_of` knows."""
+_MANY = 4
+"""Up to which columns are counted."""
 
 
 @cache
@@ -85,7 +86,7 @@ ROW_COUNT = TimerColumn(-1, "", "index")
 """Where rows have neither times nor numbers, they are counted."""
 
 
-class ColumnPair(NamedTuple):
+class Signal(NamedTuple):
     """A column of times with the column that says what happened, of an input and of a run.
 
     Attributes
@@ -125,32 +126,20 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     if width > _MOST_COLUMNS:
         limits = {"columns": width, "limit": _MOST_COLUMNS}
         file.problems.refuse(rows[0].line, 1, "too_many_columns", **limits)
-    cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
     heading = block.find_heading(width)
+    cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
     facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
-    filled = [len(cells[n]) for n, fact in facts.items() if "levels" in fact]
-    table = {
-        "single": len(facts) == 1,
-        "rising": any({"rises", "fractions"} <= fact for fact in facts.values()),
-        "listed": len(facts) >= _FEWEST_TIMES
-        and all(fact.isdisjoint({"levels", "few", "words", "many"}) for fact in facts.values()),
-        "worded": any("levels" in fact and "plain" not in fact for fact in facts.values()),
-        "rated": block.find_time_base() is not None,
-        "paired": len(filled) == 2,
-        "several": len(filled) > 2,
-        # Without states of each input in each row, a row says a single one's.
-        "gaps": 2 * sum(filled) < (len(filled) + 1) * len(rows),
-    }
-    shared = _held(table)
+    shared = {f"table.{fact}" for fact in set().union(*facts.values())}
+    states = sum("all.state" in fact for fact in facts.values())
+    shared |= {f"columns.{min(len(facts), _MANY)}", f"states.{min(states, _MANY)}"}
+    shared |= {"rated"} if block.find_time_base() else set()
     columns = [_read_heading(block, heading, n, fact | shared) for n, fact in facts.items()]
     if heading is None:
         for row in block.headings:
             if row.known > 1 and len(row.texts) > width:
                 file.problems.refuse(row.line, 1, "heading_unfit", columns=width)
         inputs = [column for column in columns if column.role in SAMPLED]
-        # By letters, for a number may be taken for that of a gate.
-        names = block.find_inputs(len(inputs)) or string.ascii_uppercase
-        for column, name in zip(inputs, names, strict=False):
+        for column, name in zip(inputs, block.find_inputs(len(inputs)), strict=False):
             column.gate = column.name = name
     _settle_roles(file, columns)
     above = heading or rows[0]
@@ -170,6 +159,7 @@ def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
     """Decide between roles that columns may have by those that others have."""
     there = {column.role for column in columns}
     meant = {"elapsed": "duration" if "time" in there else "time"}
+    meant |= {"level": "state"} if "state" in there else {}  # the same, without a name
     meant |= {"level": "volts"} if "volts" in there else {}  # those that are 0 at first
     # Two that may be the same two are one each; of others, falls cannot decide.
     unclear = [column for column in columns if "|" in column.role]
@@ -181,12 +171,6 @@ def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
     for column in columns:
         column.role = meant.get(column.role, column.role)
         file.has_unit &= column.role != "time" or column.power is not None
-    # Of columns that say the same times in other units, the finest is kept.
-    times = [c for c in columns if c.role == "time" and not c.numbered and c.power is not None]
-    finest = {(c.gate, c.run, c.state): c.power for c in sorted(times, key=attrgetter("power"))}
-    for column in times:
-        if column.power != finest[column.gate, column.run, column.state]:
-            column.role = "coarse"
 
 
 def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str]) -> TimerColumn:
@@ -200,14 +184,15 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
     texts = (bare, *(row.cell(n) for row in reversed(block.headings) if row.has_units))
     units = list(map(vocabulary.unit_of, texts))
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
-    labels = (find_label(text, "gate") for text in (name, *(r.cell(n) for r in block.headings)))
+    above = (_cell_above(row, n) for row in block.headings if row is not heading)
+    labels = (find_label(text, "gate") for text in (name, *above))
     rows = (row for row in block.headings if form("row of numbers").fullmatch(row.raw))
     column.gate = next(filter(None, (*labels, *(row.cell(n) for row in rows))), "")
-    is_bare_unit = unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"]
-    named: dict[str, object] = {"time": is_bare_unit, "timed": unit in POWERS, "volt": unit == "v"}
-    named |= {
+    named = {
+        "time": unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"],
+        "timed": unit in POWERS,
+        "volt": unit == "v",
         "unitless": not unit,
-        "strange": unit not in {*POWERS, "v", ""} and not find_label(unit, "gate"),
         "bare": not name,
         "first": not n,
         "labelled": column.gate,
@@ -220,50 +205,59 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
         if all((fact.lstrip("-") in facts) is (fact[0] != "-") for fact in rule.split())
     )
     if column.role in {"time", "elapsed"}:
-        column.power = 0 if "suffixed" in facts else POWERS.get(unit)
+        column.power = 0 if "all.stamp" in facts else POWERS.get(unit)
         column.state = next((state for state in ("clear", "blocked") if state in facts), "")
-        column.numbered = bool({"moment", "listed"} & facts)
-        if "counted" in facts and column.power not in {0, 9}:
-            column.wrap = 2**32 * 10 ** (12 - (column.power or 0))
+        column.numbered = "moment" in facts
+        if {"all.count", "far"} <= facts and column.power in {3, 6}:
+            column.wrap = 2**32 * TICK_HZ // 10**column.power
     return column
+
+
+def _cell_above(row: Row, n: int) -> str:
+    """Return the cell of a row above the heading; of merged cells only the first has a text."""
+    is_grouped = sum(bool(find_label(text, "gate")) for text in row.texts) > 1
+    cells = row.texts[: n + 1] if is_grouped else [row.cell(n)]
+    return next(filter(None, reversed(cells)), "")
 
 
 def _facts_of_values(texts: Sequence[str]) -> set[str]:
     """Return what holds of the values of a column, of which some may be missing."""
-    kinds = [vocabulary.kinds_of(text) for text in texts]
+    kinds = [
+        vocabulary.kinds_of(text) | {kind for kind in _FORMS if form(kind).fullmatch(text)}
+        for text in texts
+    ]
+    facts = {f"all.{kind}" for kind in frozenset.intersection(*kinds)}
+    facts |= {f"any.{kind}" for kind in frozenset().union(*kinds)}
     numbers = [float(text) for text in texts if is_number(text)]
-    is_whole = all(map(form("whole").fullmatch, texts))
-    steps, is_numeric = {b - a for a, b in itertools.pairwise(numbers)}, len(numbers) == len(texts)
-    is_count = all(map(form("count").fullmatch, texts))
-    facts = {
-        "levels": all("state" in kind for kind in kinds),
-        "suffixed": all({"timed", "clock"} & kind for kind in kinds),
-        "plain": not any({"blocked", "clear"} & kind for kind in kinds),
-        "beams": all({"blocked", "clear"} & kind for kind in kinds),
-        "signals": all({"high", "low"} & kind for kind in kinds),
-        "fractions": not is_whole and any("." in text or "," in text for text in texts),
-        "rises": is_numeric and min(steps, default=0.0) >= 0.0 and steps != {0.0},
-        "counts": is_numeric and steps == {1.0},
-        "counted": is_count and abs(int(texts[-1]) - int(texts[0])) > 100,
-        "few": is_whole and len(texts) >= 2 * len(set(texts)),
-        "bits": set(texts) <= {"0", "1"},
-        "constant": len(set(texts)) == 1 < len(texts),
-        "words": not numbers,
-        "many": len(texts) > 30,
-    }
-    return _held(facts)
+    steps = {b - a for a, b in itertools.pairwise(numbers)} if "all.number" in facts else {-1.0}
+    is_rising = min(steps, default=0.0) >= 0.0 and steps != {0.0}
+    return facts | _held(
+        {
+            "rises": is_rising,
+            "climbs": is_rising and "any.fraction" in facts,
+            "words": not numbers,
+            "counts": steps == {1.0},
+            "far": len(numbers) > 1 and abs(numbers[-1] - numbers[0]) > 100,
+            "few": "all.whole" in facts and len(texts) >= 2 * len(set(texts)),
+            "constant": len(set(texts)) == 1 < len(texts),
+            "many": len(texts) > 30,
+        }
+    )
 
 
 def _held(facts: Mapping[str, object]) -> set[str]:
     return {fact for fact, holds in facts.items() if holds}
 
 
-def pair_columns(columns: Sequence[TimerColumn]) -> list[ColumnPair]:
+def pair_columns(columns: Sequence[TimerColumn]) -> list[Signal]:
     """Give each column of times what belongs to it: values of its run and input, and names."""
     counts = [column for column in columns if column.role == "index"][:1] or [ROW_COUNT]
-    times = [column for column in columns if column.role == "time"] or counts
+    times = [column for column in columns if column.role == "time"]
+    # Of columns that say the same times in other units, the finest is kept.
+    finest = {_part_of(c): c.power for c in sorted(times, key=lambda c: c.power or 0)}
+    times = [c for c in times if c.numbered or c.power == finest[_part_of(c)]] or counts
     chosen = next((v for v in VALUES if any(c.role in v for c in columns)), ())
-    is_sampled, pairs = chosen == SAMPLED, list[ColumnPair]()
+    is_sampled, pairs = chosen == SAMPLED, list[Signal]()
     for clock in times:
         own = [column for column in columns if _clock_of(column, times) is clock]
         places = {} if is_sampled else {c.role: c.at for c in [*columns[::-1], *own[::-1]]}
@@ -274,11 +268,15 @@ def pair_columns(columns: Sequence[TimerColumn]) -> list[ColumnPair]:
             is_beside = is_sampled or len(values) > 1
             label = _label_of(value) if is_beside else clock.gate or value.gate
             label += f" ({n})" if is_sampled and labels[label] > 1 else ""
-            pairs.append(ColumnPair(clock, value, clock.run or value.run, label, *names))
+            pairs.append(Signal(clock, value, clock.run or value.run, label, *names))
         if not values and not is_sampled:
             moment = replace(clock, at=_NOWHERE, role="moment")
-            pairs.append(ColumnPair(clock, moment, clock.run, clock.gate, *names))
+            pairs.append(Signal(clock, moment, clock.run, clock.gate, *names))
     return pairs
+
+
+def _part_of(clock: TimerColumn) -> tuple[str, str, str]:
+    return clock.gate, clock.run, clock.state
 
 
 def _clock_of(value: TimerColumn, times: Sequence[TimerColumn]) -> TimerColumn:

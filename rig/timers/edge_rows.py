@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 from fractions import Fraction
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +53,7 @@ def read_edges(path: str | Path) -> list[Drop]:
     heading = next(rows, Row(1, []))
     if ",".join(heading.texts).lower() != header:
         problems.refuse(heading.line, 1, "wrong_header", header=header)
-    runs: dict[int, list[Edge]] = {}
+    runs: dict[int, list[tuple[int, int, bool]]] = {}
     last: dict[tuple[int, int], int] = {}
     for row in rows:
         if len(row.texts) != len(HEADER):
@@ -68,7 +69,7 @@ def read_edges(path: str | Path) -> list[Drop]:
             continue
         run, channel, tick, state = cells
         edges = runs.setdefault(run, [])
-        first = edges[0].tick if edges else tick
+        first = edges[0][0] if edges else tick
         begin, end = last.get((run, channel), first - _LONGEST_RUN), first + _LONGEST_RUN
         if not begin <= tick <= end:
             since, until = (seconds(bound, Fraction(TICK_HZ)) for bound in (begin, end))
@@ -76,20 +77,20 @@ def read_edges(path: str | Path) -> list[Drop]:
             problems.reject(*row.place(2), HEADER[2], row.texts[2], accepted)
             continue
         last[run, channel] = tick
-        edges.append(Edge(tick, channel, bool(state)))
+        edges.append((tick, channel, bool(state)))
     problems.raise_if_any()
     if not any(runs.values()):
         problems.refuse(1, 1, "no_edges")
     return [make_drop(run, runs[run]) for run in sorted(runs)]
 
 
-def make_drop(run: int, edges: list[Edge]) -> Drop:
+def make_drop(run: int, edges: Iterable[tuple[int, int, bool]]) -> Drop:
     """Make a drop of edges in ps: in order, counted from the whole second before the first."""
-    edges.sort(key=lambda edge: edge.tick)  # equal times stay in their order
-    start = edges[0].tick // TICK_HZ * TICK_HZ
-    first = {edge.channel: edge.blocked for edge in reversed(edges)}
+    rows = sorted(edges, key=itemgetter(0))  # equal times stay in their order
+    start = rows[0][0] // TICK_HZ * TICK_HZ
+    first = {channel: blocked for _, channel, blocked in reversed(rows)}
     clear = sum(1 << channel for channel, blocked in first.items() if not blocked)
-    stamps = tuple(Edge(edge.tick - start, edge.channel, edge.blocked) for edge in edges)
+    stamps = tuple(Edge(tick - start, channel, blocked) for tick, channel, blocked in rows)
     return Drop(run, 1, TICK_HZ, stamps, initial_state=clear)
 
 

@@ -41,9 +41,6 @@ _FEWEST_SAME = 3
 """Edges at the same times: the first may be 0 in every run, and a second by chance."""
 _HEAD = 50
 """Lines above or at which the project's own header stands."""
-_EXCESS = 4
-"""Edges for each bar, twice as many as it has, beyond which several gates are on one wire: a beam
-that flickers makes a few more than two."""
 
 
 class FallMatch(NamedTuple):
@@ -122,7 +119,7 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
     if not options.as_read:
         readings = [reading for reading in readings if reading.is_whole] or readings
         reading, match = _choose(readings, place, fit, stated)
-        _refuse_excess(reading, bars, place, is_stated="groups" in stated)
+        _refuse_impossible(reading, place, is_stated="groups" in stated)
     notes = [*reading.file.notes, _account(reading, options)]
     if not options.as_read:
         notes.append(make_reason("reading_chosen", option=str(reading.layout), fit=match.text))
@@ -147,7 +144,7 @@ def _find_readings(
             read_file(file)
             stated = _read_stated(options, file, gates)
             possible = [FileReading(file, x) for x in find_layouts(file, gates, bars, stated)]
-            readings += [x for x in possible if x.runs and max(x.lasting) <= _LONGEST]
+            readings += [reading for reading in possible if reading.runs]
         except InputError as error:
             faults.append(error)
         way, ways = way + 1, file.ways
@@ -157,7 +154,12 @@ def _find_readings(
         pairs = ",".join(f"{name}={n}" for name, n in zip(file.labels, gates, strict=False))
         values = {"inputs": ", ".join(file.labels), "channels": ", ".join(map(str, gates))}
         raise refusal(options.events, "inputs_unclear", **values, pairs=pairs)
-    return readings, stated
+    shortest = min(readings, key=lambda reading: max(reading.lasting))
+    if max(shortest.lasting) > _LONGEST:
+        limit = {"lasting_s": max(shortest.lasting) / TICK_HZ, "limit_s": LONGEST_S}
+        place = f"{options.events}:{shortest.line[shortest.tick.argmax()]}:1"
+        raise refusal(place, "too_long", recording="a drop", **limit)
+    return [reading for reading in readings if max(reading.lasting) <= _LONGEST], stated
 
 
 def _choose(
@@ -196,8 +198,8 @@ def _choose(
     return reading, match
 
 
-def _refuse_excess(reading: FileReading, bars: int, place: str, *, is_stated: bool) -> None:
-    """Refuse what no drop does: the same again, more edges than bars, two changes at once.
+def _refuse_impossible(reading: FileReading, place: str, *, is_stated: bool) -> None:
+    """Refuse what no drop does: the same again, or two changes at once.
 
     An input that has a name is no wire of all gates, unless the user stated so.
     """
@@ -215,10 +217,6 @@ def _refuse_excess(reading: FileReading, bars: int, place: str, *, is_stated: bo
         run, count = max(same.items(), key=itemgetter(1), default=(0, 0))
         if count and count >= min(len(moments), max(_FEWEST_SAME, 1 + len(moments) // 2)):
             raise refusal(place, "same_twice", run=drop.run, other=run)
-        channel, count = Counter(edge.channel for edge in drop.edges).most_common(1)[0]
-        if count > _EXCESS * bars:
-            excess = {"run": drop.run, "channel": channel, "count": count, "most": 2 * bars}
-            raise refusal(place, "more_edges", **excess)
     # Of changes alone, two in a row mean that the row of the first is missing.
     changes = Counter(zip(reading.line.tolist(), reading.tick, strict=True))
     lines = [line for (line, _), count in changes.items() if count > 1]
@@ -231,7 +229,7 @@ def _account(reading: FileReading, options: Namespace) -> Reason:
     file, used = reading.file, {*reading.line.tolist()}
     # A level that changes may be of an input that is no gate.
     changed = file.changes["line"][~file.changes["first"]]
-    left = set() if file.is_sampled else {*changed.tolist()} - used
+    left = set() if file.is_sampled else ({*changed.tolist()} - used) | reading.dropped
     unused = sorted({*file.unread, *left})
     counts = {"runs": len(reading.runs), "rows": file.rows, "edges": len(reading.line)}
     if not unused:
@@ -249,6 +247,9 @@ def _some(lines: Sequence[int]) -> str:
 def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]:
     """Yield what is taken to be so, and what the file lacks."""
     file, layout, channels = reading.file, reading.layout, reading.layout.channels
+    if reading.renamed:
+        runs = ", ".join(f"{name} is run {n}" for name, n in reading.renamed.items())
+        yield make_reason("runs_renamed", runs=runs)
     if layout.pause_s:
         yield make_reason("several_drops", drops=len(reading.runs), pause_s=layout.pause_s)
     if file.period:

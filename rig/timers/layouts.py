@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from rig.arrays import Index
-from rig.records import Drop, Edge
+from rig.records import Drop
 from rig.timers.edge_rows import make_drop
 from rig.timers.moments import TICK_HZ
 from rig.timers.signals import STATES, Changes
@@ -87,6 +87,10 @@ class FileReading:
         Inputs whose first row is a beam that is blocked, at the beginning or by a change.
     line, tick, channel, blocked
         Of each edge: the line that it comes from, its time, ps, its gate, and the state after it.
+    dropped
+        Lines of changes at inputs that are no gate.
+    renamed
+        Runs that the file calls otherwise: its name, and the number here.
     """
 
     def __init__(self, file: TimerFile, layout: FileLayout) -> None:
@@ -113,9 +117,14 @@ class FileReading:
         self.firsts = [[*file.names][n] for n in np.unique(changes["label"][is_odd])]
         is_change = ~changes["first"] | (blocked & (is_late | (layout.first == "change")))
         is_edge = is_change & (channel >= 0)
-        drops, places = np.unique(drop[is_edge], return_inverse=True)
+        self.dropped = {*changes["line"][is_change & ~is_edge].tolist()}
+        drops, first, places = np.unique(drop[is_edge], return_index=True, return_inverse=True)
         runs = numbers[drops]
-        runs = np.where(runs > 0, runs, runs.max(initial=0) + np.cumsum(runs == 0))[places]
+        runs = np.where(runs > 0, runs, runs.max(initial=0) + np.cumsum(runs == 0))
+        names = np.array([*file.names])[changes["run"][is_edge][first]]
+        called = zip(names.tolist(), runs.tolist(), strict=True)
+        self.renamed = {name: n for name, n in called if name and number_of(name) != n}
+        runs = runs[places]
         order = np.flatnonzero(is_edge)[np.argsort(runs, kind="stable")]
         self.line, self.tick = changes["line"][order], changes["tick"][order]
         self.channel, self.blocked = channel[order], blocked[order]
@@ -131,7 +140,7 @@ class FileReading:
         """Return the n-th drop."""
         part = slice(*self.places[n : n + 2])
         columns = (x[part].tolist() for x in (self.tick, self.channel, self.blocked))
-        return make_drop(self.runs[n], list(map(Edge, *columns)))
+        return make_drop(self.runs[n], zip(*columns, strict=True))
 
     @property
     def lasting(self) -> list[int]:
@@ -150,10 +159,8 @@ class FileReading:
 
         Where the file says when they are blocked, it is not doubted.
         """
-        run = np.repeat(self.runs, np.diff(self.places))
-        _, first, counts = np.unique(
-            run * 100 + self.channel, return_index=True, return_counts=True
-        )
+        run = np.repeat(self.runs, np.diff(self.places)) * 100 + self.channel
+        _, first, counts = np.unique(run, return_index=True, return_counts=True)
         if self.layout.dark.startswith("turns"):
             return not np.any(counts % 2)
         return self.layout.dark not in {"high", "low"} or bool(np.any(self.blocked[first]))
@@ -185,9 +192,12 @@ def group_changes(
         is_late = np.diff(changes["tick"], prepend=0) >= round(pause_s * TICK_HZ)
         drops += np.cumsum(is_late & (np.diff(drops, prepend=-1) == 0))
     _, starts = np.unique(drops, return_index=True)
-    numbers = np.array([number_of(name) or 0 for name in file.names])[changes["run"][starts]]
+    named = np.array([-1 if (n := number_of(x)) is None else n for x in file.names])
+    numbers = named[changes["run"][starts]]
+    numbers += np.any(numbers == 0)  # a file may count its runs from 0
     _, known = np.unique(numbers, return_index=True)
-    return changes, drops, np.where(np.isin(np.arange(len(numbers)), known), numbers, 0)
+    is_first = np.isin(np.arange(len(numbers)), known)
+    return changes, drops, np.where(is_first, np.maximum(numbers, 0), 0)
 
 
 def count_before(keys: Index) -> Index:
@@ -232,38 +242,41 @@ def find_layouts(
     for values in itertools.product(*choices.values()):
         layout = FileLayout(**dict(zip(choices, values, strict=True)))
         maps = [stated["channels"]] if "channels" in stated else _channels(file, gates, layout)
-        pauses = [float(stated["pause_s"])] if "pause_s" in stated else _pauses(file, layout)
+        pauses = _pauses(file, layout.unit, layout.groups)
+        pauses = [float(stated["pause_s"])] if "pause_s" in stated else pauses
         for channels, pause in itertools.product(maps, pauses):
             yield replace(layout, channels=channels, pause_s=pause)
 
 
 def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
-    """Return how changes may be put into runs; those of rows first where times begin anew."""
-    groups = ["runs", *["unsorted"] * file.is_stacked]
-    if file.is_wide:
-        is_anew = np.any(np.diff(file.changes["tick"]) < 0)
-        groups = ["rows", "columns", *groups] if is_anew else [*groups, "rows", "columns"]
+    """Return how changes may be put into runs."""
+    groups = ["runs", *["unsorted"] * file.is_stacked, *["rows", "columns"] * file.is_wide]
     is_wire = len(file.labels) < 2 and bars == 1 and len(gates) > 1
     return groups + ["passing"] * is_wire
 
 
-def _pauses(file: TimerFile, layout: FileLayout) -> list[float]:
+@lru_cache(4)
+def _pauses(file: TimerFile, unit: str, groups: str) -> list[float]:
     """Return the pause, s, at which drops one after the other are parted, if there may be any.
 
     Between drops nothing passes for far longer than within one: of the pauses in order, the first
     of half a second or more that is three times as long as the one before.
     """
-    changes, drop, _ = group_changes(file, layout.unit, layout.groups, 0.0)
-    ticks = changes["tick"].tolist() if not np.any(drop) else []
-    pauses = sorted(b - a for a, b in itertools.pairwise(ticks))
+    changes, drop, _ = group_changes(file, unit, groups, 0.0)
+    ticks, is_same = changes["tick"], np.diff(drop) == 0
+    pauses = sorted(np.diff(ticks)[is_same].tolist()) if not file.has_runs else []
     for before, pause in itertools.pairwise(pauses):
         if pause >= max(_CLEAR_PAUSE * before, TICK_HZ / 2):
-            return [0.0, pause / TICK_HZ][ticks[-1] - ticks[0] > _LONGEST_S * TICK_HZ :]
+            is_long = not np.any(drop) and ticks[-1] - ticks[0] > _LONGEST_S * TICK_HZ
+            return [0.0, pause / TICK_HZ][is_long:]
     return [0.0]
 
 
 def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list[dict[str, int]]:
-    """Return which gate each input may be: by its number, or in the order of their passages."""
+    """Return which gate each input may be: by its number, in their order, or in that of passages.
+
+    Inputs may be numbered from another number than channels, or have letters.
+    """
     labels = input_names(file, layout.groups, gates)
     if layout.groups == "passing":
         return [dict(zip(labels, gates, strict=True))]
@@ -273,6 +286,8 @@ def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list
     later = file.changes[~file.changes["first"]][::-1]
     first = dict(zip(later["label"].tolist(), later["tick"], strict=True))
     passed = sorted(labels, key=lambda label: first.get(file.names[label], 0))
-    chosen = itertools.combinations(gates, len(labels))
-    maps = [dict(zip(passed, beams, strict=True)) for beams in chosen]
-    return maps[:_MOST_MAPS] or [by_number] * bool(by_number)
+    numbered = sorted(labels, key=lambda label: (number_of(label) or 0, label))
+    chosen = [*itertools.combinations(gates, len(labels))][:_MOST_MAPS]
+    maps = [dict(zip(numbered, sorted(beams), strict=True)) for beams in chosen[:1]]
+    maps += [dict(zip(passed, beams, strict=True)) for beams in chosen]
+    return maps or [by_number] * bool(by_number)

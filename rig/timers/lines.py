@@ -18,16 +18,6 @@ _START = 4096
 """Bytes that show the encoding, or that this is no text."""
 
 
-def _decode_as_windows(fault: UnicodeError) -> tuple[str, int]:
-    """Read bytes that are no UTF-8 as Windows writes them."""
-    if not isinstance(fault, UnicodeDecodeError):
-        raise fault
-    return fault.object[fault.start : fault.end].decode("cp1252", "replace"), fault.end
-
-
-codecs.register_error("windows", _decode_as_windows)
-
-
 def read_lines(path: str | Path) -> Generator[str]:
     """Yield the lines of a text file: UTF-8, UTF-16 with its mark and without, or Windows'.
 
@@ -53,7 +43,9 @@ def read_lines(path: str | Path) -> Generator[str]:
             encoding = "utf-16-be" if zeros[0] else "utf-16-le"
         elif b"\0" in start:
             problems.refuse(1, 1, "not_text")
-        with Path(path).open(encoding=encoding, errors="windows") as stream:
+        elif "\ufffd" in start.decode("utf-8", "replace").rstrip("\ufffd"):
+            encoding = "cp1252"
+        with Path(path).open(encoding=encoding, errors="replace") as stream:
             read_line = partial(stream.readline, LONGEST_LINE)
             for number, line in enumerate(iter(read_line, ""), 1):
                 if len(line) == LONGEST_LINE:

@@ -1,40 +1,38 @@
 """Rows of a table as changes: what each column says at a time, and when that changes.
 
 A column of volts, of levels or of states, and a column of times alone, are all the same thing: at a
-time, an input had a value. Rows are read in chunks, a column at once.
+time, an input had a value.
 """
 
 from __future__ import annotations
 
+import itertools
+from array import array
 from functools import lru_cache
-from itertools import compress, islice, zip_longest
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rig.reasons import make_reason
-from rig.timers.columns import ROW_COUNT, SAMPLED, pair_columns, roles
+from rig.timers.columns import SAMPLED, columns_of, pair_columns, roles
 from rig.timers.crossings import find_crossings, find_threshold
-from rig.timers.moments import LONGEST_S, TICK_HZ, moment
+from rig.timers.moments import TICK_HZ, moment
 from rig.timers.vocabulary import is_number, state_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Iterator
 
-    from rig.arrays import Array, Flags
-    from rig.timers.columns import ColumnPair, TimerColumn
-    from rig.timers.table import Row, TimeBase
+    from rig.timers.columns import TimerColumn
+    from rig.timers.table import Row
     from rig.timers.timer_file import TimerFile
 
 MAX_EVENTS = 500_000
 """Those of 600 drops of 25 rods past 16 gates; what has more is no record of drops."""
-_CHUNK = 5000
-"""Rows that are read at once."""
 STATES = ("", "clear", "blocked", "low", "high")
 """What begins with a change, of a beam or of a signal; nothing where the file does not say."""
-_SILENT, _VOLTS, _REJECTED = 0, 5, 6
-"""What a cell says beside `STATES`: nothing, a number of volts, or what is not accepted."""
+_REJECTED = len(STATES)
+"""What a cell says that is not accepted; one that says nothing is 0."""
 CHANGE = np.dtype(
     {
         "names": ["line", "tick", "rank", "state", "label", "run", "clock", "block", "first"],
@@ -47,12 +45,15 @@ times are before it; which of `STATES` begins; what the file calls the input and
 whether it is a first row, which may say the state at the beginning."""
 Changes: TypeAlias = NDArray[Any]
 """Rows of `CHANGE`."""
-Cells: TypeAlias = "Mapping[int, Sequence[str]]"
-"""Cells of rows that are read at once, by their column."""
 
 
 class SignalReader:
     """Reads rows whose columns are the same.
+
+    Parameters
+    ----------
+    sample
+        The first of them, which show what the columns are.
 
     Attributes
     ----------
@@ -63,169 +64,147 @@ class SignalReader:
         otherwise each state is.
     """
 
-    def __init__(self, file: TimerFile, columns: list[TimerColumn], sample: list[Row]) -> None:
-        self.file, self.pairs = file, pair_columns(columns)
-        self.clocks = list(dict.fromkeys(pair.clock for pair in self.pairs))
-        self.places = {column.role: column.at for column in reversed(columns)}
-        self.is_sampled = not self.places.keys().isdisjoint(SAMPLED)
-        values = [pair.value.at for pair in self.pairs if pair.value.role != "moment"]
+    def __init__(self, file: TimerFile, sample: list[Row]) -> None:
+        columns = columns_of(file, sample[0].block, sample)
+        self.file, self.signals = file, pair_columns(columns)
+        self.clocks = list(dict.fromkeys(signal.clock for signal in self.signals))
+        used = {column.role for column in columns}
+        values = [signal.value.at for signal in self.signals if signal.value.role != "moment"]
         filled = sum(row.cell(at) != "" for row in sample for at in values)
-        self.has_several, is_table = len(values) > 1, len(values) > len(self.clocks)
-        is_filled = 2 * filled >= (len(values) + 1) * len(sample)
-        self.is_whole = self.is_sampled or (is_table and is_filled)
-        self.needed = {at for x in self.pairs for at in (x.clock.at, x.value.at, *x[-2:])}
-        rest = (column for column in columns if column.role not in {"index", "coarse"})
-        self.unused = ", ".join(column.name for column in rest if column.at not in self.needed)
+        is_filled = len(values) == 1 or 2 * filled >= (len(values) + 1) * len(sample)
+        self.has_times = "time" in used
+        self.has_names = not used.isdisjoint({"gate", "run"}) or bool(values)
+        self.sparse = {
+            n for n, x in enumerate(self.signals) if len(values) > 1 and x.value.role != "moment"
+        }
+        self.is_sampled = "volts" in used or ("level" in used and is_filled)
+        self.is_whole = is_filled and (self.is_sampled or len(values) > len(self.clocks))
+        needed = {at for x in self.signals for at in (x.clock.at, x.value.at, *x[-2:])}
+        unused = (x.name for x in columns if x.role != "index" and x.at not in needed)
+        self.unused = ", ".join(unused)
+        file.notes += [make_reason("columns_unused", columns=self.unused)] if self.unused else []
+        file.lines += [f"  {column.name}: {column.meaning}" for column in columns]
         runs = [clock.run for clock in self.clocks]
         file.is_sampled |= self.is_sampled
         file.is_wide |= not self.is_sampled and len(runs) > 1 and not any(runs)
-        file.has_runs |= "run" in self.places and not self.is_sampled
+        file.has_runs |= "run" in used and not self.is_sampled
 
-    def read(self, rows: Iterator[Row], base: TimeBase) -> Changes:
+    def read(self, rows: Iterator[Row]) -> list[Changes]:
         """Return the changes that rows say; a row may say that nothing changes, or be unread.
 
-        Parameters
-        ----------
-        base
-            Of samples without times: when the first was taken, and the time between them, s.
+        Rows of samples without times are at a stated rate.
         """
-        file, self.base, self.count = self.file, base, 0
-        self.latest, self.starts = dict[int, int](), dict[tuple[int, int], int]()
-        parts: list[list[Any]] = [[] for _ in self.pairs]
-        while chunk := list(islice(rows, _CHUNK)):
-            filled = enumerate(zip_longest(*(row.texts for row in chunk), fillvalue=""))
-            cells = dict.fromkeys(self.needed, [""] * len(chunk)) | dict(filled)
-            cells[ROW_COUNT.at] = [str(self.count + n) for n in range(len(chunk))]
-            times = {clock.at: self._read_times(chunk, clock, cells) for clock in self.clocks}
-            is_read = np.zeros(len(chunk), dtype=bool)
-            for pair, part in zip(self.pairs, parts, strict=True):
-                ticks, is_said = times[pair.clock.at]
-                if self.has_several and pair.value.role != "moment":
-                    is_said = is_said & [word != "" for word in cells[pair.value.at]]
-                is_read |= is_said
-                part.append(self._read_values(chunk, pair, cells, ticks, is_said))
-            file.unread += [row.line for row in compress(chunk, ~is_read)]
-            self.count += len(chunk)
-            changed = sum(len(x) for part in parts for x in part if x.dtype == CHANGE)
-            if changed > MAX_EVENTS:
-                file.problems.refuse(chunk[-1].line, 1, "too_many_events", limit=MAX_EVENTS)
+        file, first = self.file, next(rows)
+        base = (0.0, 1.0) if self.has_times else first.block.find_time_base()
+        if base is None:
+            file.problems.refuse(first.line, 1, "no_rate", lacks="a column of times or a rate")
+        self.base, self.count = base, 0
+        self.starts, self.latest = dict[int, int](), dict[int, int]()
+        self.values, self.keys = dict[int, tuple[int, ...]](), set[tuple[int, ...]]()
+        self.changes, self.samples = list[Any](), [array("d") for _ in self.signals]
+        for row in itertools.chain([first], rows):
+            ticks = {clock.at: self._read_time(row, clock) for clock in self.clocks}
+            is_read = False
+            for n, signal in enumerate(self.signals):
+                word, tick = row.cell(signal.value.at), ticks[signal.clock.at]
+                if tick is not None and (word or n not in self.sparse):
+                    self._read_value(n, row, word, tick)
+                    is_read = True
+            file.unread += [] if is_read else [row.line]
+            self.count += 1
+            if len(self.changes) > MAX_EVENTS:
+                file.problems.refuse(row.line, 1, "too_many_events", limit=MAX_EVENTS)
         file.rows += self.count
-        signals = [np.concatenate(part) for part in parts]
-        if "volts" in self.places:
-            signals = [self._find_crossings(*x) for x in zip(self.pairs, signals, strict=True)]
-        else:
-            signals = [self._mark_firsts(self._without_same(changes)) for changes in signals]
-        silent = self.count - len({line for x in signals for line in x["line"].tolist()})
+        if self.unused and not self.has_names:
+            steps = [b[1] - a[1] for a, b in itertools.pairwise(self.changes)]
+            if len(steps) > 3 and max(steps) < 1.5 * min(steps):
+                file.problems.refuse(first.line, 1, "regular_samples", columns=self.unused)
+        volts = [n for n, signal in enumerate(self.signals) if signal.value.role == "volts"]
+        parts = [np.array(self.changes, CHANGE), *map(self._find_crossings, volts)]
+        silent = self.count - len({line for part in parts for line in part["line"].tolist()})
         if self.is_sampled and 2 * silent > self.count:
             lasting = max(self.latest.values()) - min(self.starts.values())
             file.period = lasting // max(1, self.count - 1)
-        return np.concatenate(signals)
+        return parts
 
-    def _read_times(self, rows: list[Row], clock: TimerColumn, cells: Cells) -> tuple[Any, Flags]:
-        """Return the times of rows, ps, and which of them say one."""
-        at, problems, ticks = clock.at, self.file.problems, list[int]()
+    def _read_time(self, row: Row, clock: TimerColumn) -> int | None:
+        """Return the time of a row, ps; `None` where it says nothing."""
+        text = row.cell(clock.at) if clock.at >= 0 else str(self.count)
+        tick = moment(text, clock.power or 0)
+        if tick is None:
+            if text:
+                self._reject(row, clock, text)
+            return None
         # Of another input's row nothing is said; telephones fill up with zeros.
-        is_padded = clock.numbered and clock is not self.clocks[0]
-        is_said = np.zeros(len(rows), dtype=bool)
-        for n, (row, text) in enumerate(zip(rows, cells[at], strict=True)):
-            tick = moment(text, clock.power or 0)
-            if text and tick is None:
-                self._reject(row, clock)
-            ticks.append(tick or 0)
-            if tick is None or (tick == 0 and is_padded):
-                continue
-            if clock.role != "time":
-                tick = round(self.base[0] * TICK_HZ + self.base[1] * tick)
-            latest = self.latest.get(at, tick)
-            if clock.wrap:
-                tick += clock.wrap * max(0, round((latest - tick) / clock.wrap))
-            lasting_s = abs(tick - self.starts.setdefault((at, row.block.number), tick)) / TICK_HZ
-            if self.is_sampled and tick < latest:
-                problems.add(*row.place(at), "time", "backwards", text=text)
-            if clock.power is not None and lasting_s > LONGEST_S:
-                limit = {"recording": "a block", "lasting_s": lasting_s, "limit_s": LONGEST_S}
-                problems.add(*row.place(at), clock.role, "too_long", **limit)
-            self.latest[at] = ticks[n] = tick
-            is_said[n] = True
-        return np.array(ticks, dtype=object), is_said
+        if tick == 0 and clock.numbered and clock is not self.clocks[0]:
+            return None
+        if clock.role != "time":
+            tick = round(self.base[0] * TICK_HZ + self.base[1] * tick)
+        latest = self.latest.get(clock.at, tick)
+        if clock.wrap:
+            tick += clock.wrap * max(0, round((latest - tick) / clock.wrap))
+        if self.is_sampled and tick < latest:
+            self.file.problems.add(*row.place(clock.at), "time", "backwards", text=text)
+        self.starts.setdefault(clock.at, tick)
+        self.latest[clock.at] = tick
+        return tick
 
-    def _read_values(
-        self, rows: list[Row], pair: ColumnPair, cells: Cells, ticks: Any, is_said: Flags
-    ) -> Any:
-        """Return what a column says: line, time and volts of its samples, or states."""
-        names, words = self.file.names, cells[pair.value.at]
-        meanings = {x: code_of(pair.value.role, x or pair.value.state) for x in {*words}}
-        codes = np.array([meanings[word] for word in words])
-        for row in compress(rows, is_said & (codes == _REJECTED)):
-            self._reject(row, pair.value)
-        lines = np.array([row.line for row in rows])
-        if pair.value.role == "volts":
-            is_said = is_said & (codes == _VOLTS)
-            offsets = ticks[is_said] - min(self.starts.values(), default=0)
-            volts = [float(word) for word in compress(words, is_said)]
-            return np.array([lines[is_said], offsets, volts], dtype=float).T
-        if self.is_sampled:
-            is_said = is_said & (codes != _SILENT)
-        changes = np.zeros(len(rows), CHANGE)
-        changes["line"], changes["tick"], changes["state"] = lines, ticks, codes
-        changes["clock"] = 0 if pair.clock.numbered or pair.label else pair.clock.at
-        changes["block"] = [row.block.number for row in rows]
-        runs = (text or pair.run for text in cells[pair.run_at])
-        changes["run"] = [names.setdefault(run, len(names)) for run in runs]
-        gates = zip(cells[pair.gate_at], rows, strict=True)
-        labels = (text or pair.label or row.block.gate for text, row in gates)
-        changes["label"] = [names.setdefault(label, len(names)) for label in labels]
-        return self._without_same(changes[is_said])
+    def _read_value(self, n: int, row: Row, word: str, tick: int) -> None:
+        """Keep what a cell says: a sample of volts, or a state if that is a change."""
+        signal, names, block = self.signals[n], self.file.names, row.block
+        value = signal.value
+        if value.role == "volts" and is_number(word):
+            offset = tick - self.starts[signal.clock.at]
+            self.samples[n].extend((row.line, offset, float(word)))
+            return
+        state = code_of(value.role, word or value.state)
+        if state == _REJECTED:
+            self._reject(row, value, word)
+        elif state or not self.is_sampled:
+            run = names.setdefault(row.cell(signal.run_at) or signal.run, len(names))
+            before, self.values[n] = self.values.get(n), (state, run, block.number)
+            if self.is_whole and before == self.values[n]:
+                return
+            label = row.cell(signal.gate_at) or signal.label or block.gate
+            key = n, block.number, run, names.setdefault(label, len(names))
+            # A first row may be the state at the beginning of a run, and no change.
+            is_start = self.is_whole or (state == STATES.index("clear") and tick == 0)
+            is_first = is_start and key not in self.keys
+            self.keys.add(key)
+            clock = 0 if signal.clock.numbered or signal.label else signal.clock.at
+            self.changes.append(
+                (row.line, tick, 0, state, key[-1], run, clock, block.number, is_first)
+            )
 
-    def _without_same(self, changes: Changes) -> Changes:
-        """Leave out what each row says again, if each says all."""
-        is_new = np.full(len(changes), fill_value=not self.is_whole)
-        is_new[:1] = True
-        for name in "state", "run", "block":
-            is_new[1:] |= changes[name][1:] != changes[name][:-1]
-        selected: Changes = changes[is_new]
-        return selected
-
-    def _mark_firsts(self, changes: Changes) -> Changes:
-        """Mark what may be the state at the beginning of a run, and no change."""
-        block, count = changes["block"].astype(np.intp), len(self.file.names)
-        key = (block * count + changes["run"]) * count + changes["label"]
-        _, firsts = np.unique(key, return_index=True)
-        is_clear = changes["state"][firsts] == STATES.index("clear")
-        changes["first"][firsts] = self.is_whole | is_clear & (changes["tick"][firsts] == 0)
-        return changes
-
-    def _find_crossings(self, pair: ColumnPair, samples: Array) -> Changes:
+    def _find_crossings(self, n: int) -> Changes:
         """Return where volts cross the middle; note how many do, or that nothing passes."""
+        label, start = self.signals[n].label, self.starts.get(self.signals[n].clock.at, 0)
+        samples = np.array(self.samples[n]).reshape(-1, 3)
         volts = samples[:, 2]
         if (threshold := find_threshold(volts)) is None:
             limits = {"low": min(volts, default=0), "high": max(volts, default=0)}
-            self.file.notes.append(make_reason("no_passage", input=pair.label, **limits))
+            self.file.notes.append(make_reason("no_passage", input=label, **limits))
             return np.empty(0, CHANGE)
         lines, offsets, is_high = find_crossings(samples, threshold).T
         counts = {"crossings": len(lines), "level": threshold[0]}
-        self.file.notes.append(make_reason("crossings", input=pair.label, **counts))
+        self.file.notes.append(make_reason("crossings", input=label, **counts))
         changes = np.zeros(len(lines), CHANGE)
         changes["line"], changes["state"] = lines, STATES.index("low") + is_high
-        start = min(self.starts.values())
         changes["tick"] = [start + round(offset) for offset in offsets.tolist()]
-        changes["label"] = self.file.names.setdefault(pair.label, len(self.file.names))
+        changes["label"] = self.file.names.setdefault(label, len(self.file.names))
         return changes
 
-    def _reject(self, row: Row, column: TimerColumn) -> None:
+    def _reject(self, row: Row, column: TimerColumn, text: str) -> None:
         """Note a cell whose value is not accepted."""
         accepted = roles()[column.role][1]
-        place = row.place(column.at)
-        self.file.problems.reject(*place, column.role, row.cell(column.at), accepted)
+        self.file.problems.reject(*row.place(column.at), column.role, text, accepted)
 
 
 @lru_cache(10_000)
 def code_of(role: str, word: str) -> int:
-    """Return what a word means in such a column, as a place in `STATES` or one behind them."""
-    if role == "volts" and is_number(word):
-        return _VOLTS
+    """Return what a word means in such a column: a place in `STATES`, or the one behind them."""
     state, accepted = state_of(word), roles()[role][-1].split()
     if state in {"unknown", "missing"} and role in {*SAMPLED, "moment"}:
-        return _SILENT
+        return 0
     state = dict(zip(("zero", "one"), accepted, strict=False)).get(state, state)
     return STATES.index(state) if state in accepted else _REJECTED

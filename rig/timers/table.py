@@ -10,6 +10,7 @@ from __future__ import annotations
 import csv
 import itertools
 import re
+import string
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -107,10 +108,11 @@ class RowBlock:
 
     def find_inputs(self, count: int) -> list[str]:
         """Return names of inputs without a heading: those of a row that lists as many."""
-        texts = ([x.rpartition(":")[2] for x in r.texts] for r in [*self.remarks, *self.headings])
-        labels = ([vocabulary.find_label(text, "gate") for text in row] for row in texts)
-        named = ([*filter(None, row)] for row in labels)
-        return next((names for names in named if len(names) == count), [])
+        for row in [*self.remarks, *self.headings]:
+            labels = [vocabulary.find_label(text.rpartition(":")[2], "gate") for text in row.texts]
+            if len(named := [*filter(None, labels)]) == count:
+                return named
+        return [*string.ascii_uppercase]  # for a number may be taken for that of a gate
 
 
 class Row(NamedTuple):
@@ -189,13 +191,19 @@ class Table:
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
 
-    def split(self, line: str) -> list[str]:
-        """Split a line into cells; numbers get a decimal point, and what is missing is empty."""
+    def split(self, line: str, *, is_plain: bool = False) -> list[str]:
+        """Split a line into cells; numbers get a decimal point, and what is missing is empty.
+
+        Parameters
+        ----------
+        is_plain
+            Whether it has only numbers and what parts them.
+        """
         if not self.separator:
             values = dict(_named_values(line))
             return [values.get(name, "") for name in self._names] if any(values) else [line]
         cells = split_cells(line, self.separator, len(self._usual))
-        if form("plain row").fullmatch(line) and "," not in line and "--" not in line:  # as most
+        if is_plain and (self.separator == "," or "," not in line):
             return cells
         missing, has_comma = vocabulary.words()["missing"], form("decimal comma").fullmatch
         cells = ["" if text[:5].casefold() in missing else text for text in cells]
@@ -209,7 +217,7 @@ class Table:
             if not line.strip():
                 continue
             if block.width and is_plain(line):  # as most
-                yield Row(number, self.split(line), line, block)
+                yield Row(number, self.split(line, is_plain=True), line, block)
                 continue
             mark = form("remark").match(line[:LONGEST])
             text = line[mark.end() :].rstrip('" ') if mark else line
@@ -239,10 +247,11 @@ class Table:
 
     def _is_row(self, row: Row) -> bool:
         """Whether it has values only, and at least a number or a date, or looks as if it had."""
+        if _shape(row.texts) == self._usual:  # as most
+            return True
         # Above rows of several cells may stand a date, or a count.
         is_data = len(row.texts) >= self._fewest and any(map(is_measured, row.texts))
-        is_data &= all(map(kinds_of, filter(None, row.texts)))
-        if is_data or _shape(row.texts) == self._usual:
+        if is_data and all(map(kinds_of, filter(None, row.texts))):
             return True
         # One of data with a fault: some of it is a number, as in those above, or below their names.
         above = (x.texts for x in row.block.headings if len(x.texts) == x.known)

@@ -11,12 +11,12 @@ import itertools
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
 
 from rig.reasons import Reason, make_reason
-from rig.timers.columns import columns_of
 from rig.timers.lines import is_cut, read_lines
 from rig.timers.problems import ProblemList
 from rig.timers.signals import CHANGE, Changes, SignalReader
@@ -115,8 +115,8 @@ def read_file(file: TimerFile) -> TimerFile:
         file.lines.append(f"a table, its cells separated by {_MARKS[table.separator]}")
         readers: dict[object, SignalReader] = {}
         changes = [file.changes]
-        for key, rows in itertools.groupby(table.rows(), key=lambda row: row.block.key):
-            changes += _read_rows(file, key, rows, readers)
+        for _, rows in itertools.groupby(table.rows(), attrgetter("block.key")):
+            changes += _read_rows(file, rows, readers)
             file.problems.raise_if_any()
     file.changes = np.concatenate(changes)
     file.changes = file.changes[np.argsort(file.changes["line"], kind="stable")]
@@ -131,29 +131,14 @@ def read_file(file: TimerFile) -> TimerFile:
 
 
 def _read_rows(
-    file: TimerFile, key: object, rows: Iterator[Row], readers: dict[object, SignalReader]
-) -> list[Changes]:
-    """Return what rows say whose columns are the same, and those of earlier ones with their key."""
+    file: TimerFile, rows: Iterator[Row], readers: dict[object, SignalReader]
+) -> Iterator[Changes]:
+    """Yield what rows say whose columns are the same, and those of earlier ones with their key."""
     sample = list(itertools.islice(rows, _SAMPLE))
-    rows, block = itertools.chain(sample, rows), sample[0].block
-    if key not in readers:
-        sample = [row for row in sample if row.block is block]
-        columns = columns_of(file, block, sample)
-        file.lines += [f"  {column.name}: {column.meaning}" for column in columns]
-        readers[key] = SignalReader(file, columns, sample)
-        unused = readers[key].unused
-        file.notes += [make_reason("columns_unused", columns=unused)] if unused else []
-    reader = readers[key]
-    base = (0.0, 1.0) if "time" in reader.places else block.find_time_base()
-    if reader.is_sampled and base is None:
-        lacks = "a column of times or a rate"
-        file.problems.refuse(sample[0].line, 1, "no_rate", lacks=lacks)
-    captures = itertools.groupby(rows, key=lambda row: row.block.number if reader.is_sampled else 0)
-    changes = [reader.read(part, base or (0.0, 1.0)) for _, part in captures]
-    is_told = {"edge", "state", "cleared", "gate"} & reader.places.keys()
-    if reader.unused and file.is_stacked and not is_told:
-        steps = np.diff(changes[0]["tick"])
-        if len(steps) > 3 and max(steps) < 1.5 * min(steps):
-            line = int(changes[0]["line"][0])
-            file.problems.refuse(line, 1, "regular_samples", columns=reader.unused)
-    return changes
+    block = sample[0].block
+    if block.key not in readers:
+        readers[block.key] = SignalReader(file, [row for row in sample if row.block is block])
+    reader = readers[block.key]
+    number = attrgetter("block.number") if reader.is_sampled else bool
+    for _, capture in itertools.groupby(itertools.chain(sample, rows), number):
+        yield from reader.read(capture)

@@ -20,15 +20,11 @@ def vcd_rows(lines: Iterator[tuple[int, str]], problems: ProblemList) -> Iterato
         head += line[:200] + " "
         if "$enddefinitions" in line or len(head) > _LONGEST_HEAD:
             break
-    stated, names = form("time scale").search(head), dict(form("wire").findall(head))
-    if stated is None:
-        problems.refuse(1, 1, "no_rate", lacks="a $timescale")
-    if (scale := form("scale").fullmatch(stated[1])) is None:
-        problems.reject(1, 1, "$timescale", stated[1], "a unit of time: 1, 10 or 100 s to ps")
-    elif not names:
-        problems.add(1, 1, "", "no_edges")
-    problems.raise_if_any()
-    unit = f"e-{(POWERS | {'ps': 12})[scale[2]] - scale[1].count('0') if scale else 0}"
+    scale, names = form("time scale").search(head), dict(form("wire").findall(head))
+    if scale is None or not names:
+        lacks = "a $timescale of 1, 10 or 100 s to ps, or without a wire of one bit"
+        problems.refuse(1, 1, "no_rate", lacks=lacks)
+    unit = f"e-{(POWERS | {'ps': 12})[scale[2]] - scale[1].count('0')}"
     yield 0, ",".join(["time (s)", *names.values()])
     at, time, levels, changes = 0, "0", dict.fromkeys(names, "x"), dict[str, str]()
     words = (

@@ -22,15 +22,16 @@ _SCALES = {"t": {"": 1.0, "s": 1.0, "ms": 1e-3}, "x": _LENGTHS, "y": _LENGTHS}
 
 
 class VideoTrack(NamedTuple):
-    """Moments, s, and places then, m; each of shape ``(frames,)``."""
+    """Moments, s, and places then, m; each of shape ``(frames,)``; how many rows are left out."""
 
     times: Array
     x: Array
     y: Array
+    unused: int
 
 
 def read_video(path: str | Path) -> VideoTrack:
-    """Read a table of places; frames without one are left out.
+    """Read a table of places of one object, the first; frames without a place are left out.
 
     Raises
     ------
@@ -38,8 +39,9 @@ def read_video(path: str | Path) -> VideoTrack:
         Another kind of file, too few frames, or values that are no numbers, at their places.
     """
     problems = ProblemList(str(path), make_reason("video_files").text)
-    rows = list(Table(enumerate(read_lines(path), 1)).rows())
-    rows = [row for row in rows if row.block is rows[0].block]  # of the first object
+    table = Table(enumerate(read_lines(path), 1))
+    rows = list(table.rows())
+    track = [row for row in rows if row.block is rows[0].block]
     above = rows[0].block.headings if rows else []
     heading = next((row for row in above[::-1] if len(_find_axes(row)) == len(_SCALES)), None)
     if heading is None:
@@ -49,20 +51,20 @@ def read_video(path: str | Path) -> VideoTrack:
         if unit not in _SCALES[name]:
             accepted = f"a unit of this column: {', '.join(filter(None, _SCALES[name]))}"
             problems.reject(*heading.place(n), heading.cell(n), unit, accepted)
-        for row in rows:
-            if (text := row.cell(n)) and not is_number(text):
-                problems.reject(*row.place(n), name, text, "a number")
+        for row in track:
+            if row.cell(n) and not is_number(row.cell(n)):
+                problems.reject(*row.place(n), name, row.cell(n), "a number")
     problems.raise_if_any()
     places = np.array(
         [
-            [float(row.cell(n) or "nan") * _SCALES[name][unit] for row in rows]
+            [float(row.cell(n) or "nan") * _SCALES[name][unit] for row in track]
             for name, (n, unit) in axes
         ]
     )
-    track = VideoTrack(*places[:, ~np.isnan(places).any(axis=0)])
-    if track.times.size < FEWEST or not np.all(np.diff(track.times) > 0):
-        problems.refuse(1, 1, "few_frames", frames=track.times.size, needed=FEWEST)
-    return track
+    times, x, y = places[:, ~np.isnan(places).any(axis=0)]
+    if times.size < FEWEST or not np.all(np.diff(times) > 0):
+        problems.refuse(1, 1, "few_frames", frames=times.size, needed=FEWEST)
+    return VideoTrack(times, x, y, len(rows) + len(table.strays) - len(track))
 
 
 def _find_axes(row: Row) -> dict[str, tuple[int, str]]:

@@ -15,6 +15,10 @@ LONGEST = 200
 """Characters: no cell, and no line of named values, is longer."""
 
 
+_FAMILIES = {"blocked": "beam", "clear": "beam", "high": "signal", "low": "signal"}
+"""Of what a state is; of others than these the file does not say."""
+
+
 @cache
 def read_rows(name: str, mark: str) -> list[list[str]]:
     """Return the rows of a table beside this module, their cells parted by a mark."""
@@ -127,13 +131,14 @@ def kinds_of(text: str) -> frozenset[str]:
     frozenset of str
         ``number`` (with a decimal point) or ``comma number``; ``clock``, a time of day, perhaps
         with its date; ``timed``, a time with its unit; ``input``, a name with its number;
-        ``state``, with what `state_of` says.
+        ``state``, with what `state_of` says, and ``beam``, ``signal`` or ``level``: of what it is.
     """
     state, forms = state_of(text), ("number", "comma number", "clock", "timed", "input")
     kinds = {kind for kind in forms if form(kind).fullmatch(text[: LONGEST + 1])}
     if len(text) > LONGEST or ("input" in kinds and "start" in roles_in(text)):
         return frozenset()
-    return frozenset(kinds | ({"state", state} if state else set()))
+    family = _FAMILIES.get(state, "level")
+    return frozenset(kinds | ({"state", state, family} if state else set()))
 
 
 def is_remark(line: str) -> bool:

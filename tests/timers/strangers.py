@@ -53,6 +53,11 @@ def strangers() -> dict[str, Shape]:
          for w in ("an", "aus")) + "\n"
          + table(([n, *(f"{t:.6f}" for t, _, _ in edges)]
                   for n, edges in enumerate(RUNS, 1)), ";")),
+        ("Gates over pairs of columns", "," + ",,".join(f"Gate {g}" for g in HEIGHTS) + ",\n"
+         + "Run," + ",".join(["in (s),out (s)"] * len(HEIGHTS)) + "\n"
+         + table([n, *(f"{t:.6f}" for t, _, _ in edges)] for n, edges in enumerate(RUNS, 1))),
+        ("A name for two columns", "run," + ",,".join(f"Gate {g} (s)" for g in HEIGHTS) + ",\n"
+         + table([n, *(f"{t:.6f}" for t, _, _ in edges)] for n, edges in enumerate(RUNS, 1))),
         ("Times of a row, numbered", "drop," + ",".join(f"t{k}" for k in range(1, 9)) + "\n"
          + table([n, *(f"{t:.6f}" for t, _, _ in edges)] for n, edges in enumerate(RUNS, 1))),
         ("A word for gates that is unknown", "Prova;Traguardo;Tempo (s);Stato\n"
@@ -108,6 +113,16 @@ def strangers() -> dict[str, Shape]:
     put("Start and duration", "gate,start (s),duration (s)\n" + table(
         [c, f"{a[0]:.6f}", f"{b[0] - a[0]:.6f}"] for c, (a, b) in by_gate(one).items()),
         [[edge for edge in one if edge[2]]])  # fmt: skip
+    put(
+        "Minutes and seconds",
+        "min,sec,gate,state\n"
+        + table([int((t + 59.5) // 60), f"{(t + 59.5) % 60:.6f}", c, int(d)] for t, c, d in one),
+    )
+    put(
+        "A state without a name",
+        "Time (s),State 0,State 1,,State 3\n0.000000,0,0,0,0\n"
+        + table([f"{t:.6f}", *levels(one, t)] for t, _, _ in one),
+    )
     time, channel, dark = one[3]
     bounce = [(time + 2e-6, channel, not dark), (time + 4e-6, channel, dark)]
     bouncing = [[*one[:4], *bounce, *one[4:]]]
@@ -182,7 +197,8 @@ def strangers() -> dict[str, Shape]:
 NOT_READ = {
     "Runs by a word alone", "Written by hand",
     "States the other way round", "A channel for all gates", "Samples of a channel for all gates",
-    "Durations", "A summary below", "A word below",
+    "Durations", "A summary below", "A word below", "A name for two columns",
+    "Minutes and seconds",
     "More names than columns", "Samples with an index",
     "Two tables", "Twice the same", "Changes in nanoseconds", "Thousands apart",
     "Thousands by points", "Microseconds as if they were seconds",

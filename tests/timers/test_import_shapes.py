@@ -10,8 +10,9 @@ from rig.commands.import_edges import import_with_protocol
 from rig.errors import InputError
 from rig.protocol import reader
 from rig.timers.moments import TICK_HZ
+from tests.analysis.drops import SCENES, case
 from tests.timers.mutations import mutate
-from tests.timers.shapes import PROTOCOL, Shape, run, shapes, table
+from tests.timers.shapes import PROTOCOL, RUNS, Shape, run, shapes, table
 from tests.timers.strangers import NOT_READ, REFUSED, strangers
 
 SHAPES = shapes()
@@ -131,6 +132,28 @@ def test_a_run_that_is_unlike_many_others_is_named(tmp_path):
     file.write_text("run,gate,time (s),state\n" + rows, "utf-8")
     with pytest.raises(InputError, match="run 152:"):
         import_with_protocol(reader.read(str(protocol)), options(file))
+
+
+@pytest.mark.parametrize("name", ["{}", "D{}", "{:c}"])
+def test_gates_of_a_chain_may_be_numbered_from_another_number(tmp_path, name):
+    """Its rods hang in the upper beams, so the first edges say nothing of the gates' order."""
+    drop, file = case(SCENES["single"]).drop, tmp_path / "file"
+    gates = [name.format(65 + edge.channel if "c" in name else 1 + edge.channel)
+             for edge in drop.edges]  # fmt: skip
+    rows = table([gate, f"{edge.tick / drop.tick_hz:.6f}", int(edge.blocked)]
+                 for gate, edge in zip(gates, drop.edges, strict=True))  # fmt: skip
+    file.write_text("gate,time (s),state\n" + rows, "utf-8")
+    (read,) = import_with_protocol(SCENES["single"], options(file)).drops
+    assert [edge[1:] for edge in read.edges] == [edge[1:] for edge in drop.edges]
+
+
+def test_a_run_that_has_another_number_here_is_named(tmp_path):
+    file = tmp_path / "file"
+    rows = table([n, c, f"{t:.6f}", int(d)] for n, edges in enumerate(RUNS) for t, c, d in edges)
+    file.write_text("run,gate,time (s),state\n" + rows, "utf-8")
+    imported = import_with_protocol(PARSED, options(file))
+    assert [drop.run for drop in imported.drops] == [1, 2, 3]
+    assert any("0 is run 1, 1 is run 2, 2 is run 3" in note.text for note in imported.notes)
 
 
 @pytest.mark.parametrize("name", STRANGERS)
