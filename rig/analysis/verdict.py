@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any
 
-from rig.analysis.adjust import Estimate
 from rig.analysis.annealing import MISSED
 from rig.analysis.chain_records import SIDES
-from rig.analysis.diagnoses import Diagnosis, diagnose
+from rig.analysis.diagnoses import gate_reasons
 from rig.analysis.distributions import most_by_chance
 from rig.analysis.edge_classes import UnmatchedEdge
 from rig.analysis.equations import STRAY
@@ -21,7 +21,11 @@ from rig.measurands import RELEASE_SKEW
 from rig.protocol.protocol import Protocol, Run
 from rig.reasons import Reason, make_reason
 from rig.records import Drop
+from rig.vocabulary import Vocabulary
 from rig.wordings import Severity
+
+Check = tuple[str, bool, Mapping[str, Any]]
+"""Code of a reason, whether it holds, and its values."""
 
 LATE = 0.2
 """Share of possibly late stamps, close after another stamp, above which a remark is made. Sixteen
@@ -32,10 +36,9 @@ _SURE = 4.0  # standard uncertainties
 
 def verdict_of(reasons: Iterable[Reason]) -> Verdict:
     """Return the verdict by the most severe reason."""
-    severities = {reason.severity for reason in reasons}
-    if Severity.VOID in severities:
-        return "void"
-    return "marginal" if Severity.DOUBT in severities else "accepted"
+    severity = max((reason.severity for reason in reasons), default=Severity.REMARK)
+    verdicts: dict[Severity, Verdict] = {Severity.VOID: "void", Severity.DOUBT: "marginal"}
+    return verdicts.get(severity, "accepted")
 
 
 def judge_record(drop: Drop, audit: Audit) -> tuple[Reason, ...]:
@@ -47,16 +50,15 @@ def judge_record(drop: Drop, audit: Audit) -> tuple[Reason, ...]:
 
 
 def judge(
-    protocol: Protocol,
+    fit: Fit,
     run: Run,
     drop: Drop,
     audit: Audit,
     values: Mapping[str, Measured],
-    fit: Fit,
     by_passages: Mapping[str, Measured],
     unmatched: Collection[UnmatchedEdge],
-) -> Diagnosis:
-    """Return all reasons about a fitted drop, and the gates under suspicion.
+) -> tuple[Reason, ...]:
+    """Return all reasons about a fitted drop, the most severe first.
 
     Parameters
     ----------
@@ -65,52 +67,56 @@ def judge(
     unmatched
         Edges that are missing or belong to no rod.
     """
-    record, diagnosis = judge_record(drop, audit), diagnose(fit)
-    void, doubts = _by_severity(diagnosis.reasons)
-    if diagnosis.known:  # the known fault causes all other oddities
-        return Diagnosis((*record, *void), known=True)
-    air, remarks, estimate = _air(fit), other_incline(fit, run), fit.estimate
+    protocol, words = fit.model.protocol, fit.model.protocol.vocabulary
+    reasons = [
+        *judge_record(drop, audit),
+        *_hold(_counts(protocol, audit), words),
+        *release_reasons(protocol, values),
+        *_hold(_air(fit), words),
+    ]
     # With wrong drag, the fit says nothing about the gates.
-    accused = air["air"] or tuple(void)
-    beyond, near = _by_severity([*_counts(protocol, audit), *release_reasons(protocol, values)])
-    pushed = air["air_accelerates"]
-    odd = diagnosis.odd or bool(pushed) or any(why.code == "edges_missed" for why in beyond)
-    odd |= estimate.scatter > RESTLESS or not estimate.settled
-    void = [*record, *beyond, *accused, *air["air_implausible"]]
-    reasons = [*void, *doubts]  # doubts about gates may be the cause
-    if not void:
-        reasons += [*near, *_doubts(protocol, drop, estimate), *pushed]
-        # A drop whose α differs from the model's is still good: that is a result.
-        reasons += [*disagreements(values, by_passages), *remarks]
-        later = sum(edge.kind == "later passage" for edge in unmatched)
-        reasons += [make_reason("later_passages", protocol.vocabulary, edges=later)] * (later > 0)
-    return Diagnosis(tuple(reasons), diagnosis.suspects, odd, accused=(*accused, *pushed, *remarks))
+    is_air = any(reason.code == "air" for reason in reasons)
+    reasons += [why for why in gate_reasons(fit) if not is_air or why.severity < Severity.VOID]
+    if verdict_of(reasons) != "void":  # else all this may be the consequence
+        reasons += [
+            *_hold(_doubts(fit, drop, unmatched), words),
+            *disagreements(values, by_passages),
+            # A drop whose α differs from the model's is still good: that is a result.
+            *other_incline(fit, run),
+        ]
+    return tuple(sorted(reasons, key=lambda reason: -reason.severity))
 
 
-def _by_severity(reasons: Iterable[Reason]) -> tuple[list[Reason], list[Reason]]:
-    """Split reasons into those that make a drop void and all others."""
-    parts: tuple[list[Reason], list[Reason]] = [], []
-    for reason in reasons:
-        parts[reason.severity is not Severity.VOID].append(reason)
-    return parts
+def _hold(checks: Iterable[Check], words: Vocabulary) -> list[Reason]:
+    return [make_reason(code, words, **values) for code, holds, values in checks if holds]
 
 
-def _counts(protocol: Protocol, audit: Audit) -> Iterator[Reason]:
-    """Yield reasons for missed or unexplained edges above the protocol's limits.
+def _counts(protocol: Protocol, audit: Audit) -> Iterable[Check]:
+    """Return checks of missed and unexplained edges against the protocol's limits.
 
     With few edges, a single edge is a large share. So a rig with the usual rate of misses must not
     lose more than 1 drop in 1000 by chance, and a single stray pulse is tolerated.
     """
     accept = protocol.accept
     chance = most_by_chance(audit.edge_count, min(MISSED, accept.missed_edges / 2.0))
-    if audit.missed > accept.missed_edges * audit.edge_count:
-        why = "edges_missed" if audit.missed > chance else "edges_missed_few"
-        counts = {"missed": audit.missed, "expected": audit.edge_count}
-        yield make_reason(why, protocol.vocabulary, **counts, limit=accept.missed_edges)
-    if audit.unexplained > accept.unexplained_edges * audit.received:
-        why = "edges_unexplained" if audit.unexplained > SIDES else "edges_unexplained_few"
-        counts = {"unexplained": audit.unexplained, "received": audit.received}
-        yield make_reason(why, protocol.vocabulary, **counts, limit=accept.unexplained_edges)
+    missed = {"missed": audit.missed, "expected": audit.edge_count, "limit": accept.missed_edges}
+    unexplained = {
+        "unexplained": audit.unexplained,
+        "received": audit.received,
+        "limit": accept.unexplained_edges,
+    }
+    return [
+        (
+            "edges_missed" if audit.missed > chance else "edges_missed_few",
+            audit.missed > accept.missed_edges * audit.edge_count,
+            missed,
+        ),
+        (
+            "edges_unexplained" if audit.unexplained > SIDES else "edges_unexplained_few",
+            audit.unexplained > accept.unexplained_edges * audit.received,
+            unexplained,
+        ),
+    ]
 
 
 def release_reasons(protocol: Protocol, values: Mapping[str, Measured]) -> tuple[Reason, ...]:
@@ -131,30 +137,35 @@ def release_reasons(protocol: Protocol, values: Mapping[str, Measured]) -> tuple
 
 def nearly_in_time(result: DropResult, limit: float) -> bool:
     """Whether a drop is void only for its release skew, by less than its uncertainty."""
-    if result.verdict != "void":
-        return False
-    if {why.code for why in _by_severity(result.reasons)[0]} != {"release_skew"}:
+    if result.verdict != "void" or is_wrong(result.reasons):
         return False
     skew = result.quantities[RELEASE_SKEW.name]
     return abs(skew.value) - skew.expanded < limit
 
 
-def _doubts(protocol: Protocol, drop: Drop, estimate: Estimate) -> Iterator[Reason]:
-    """Yield remarks about a fit and the device's certificate."""
-    if estimate.scatter > RESTLESS:
-        yield make_reason("scatter", factor=estimate.scatter)
-    if not estimate.settled:
-        yield make_reason("not_converged", protocol.vocabulary)
-    device, edges = drop.certificate, max(1, len(drop.edges))
-    if device is not None and device.late > LATE * edges:
-        yield make_reason("late_stamps", edges=device.late)
-    # A pulse too short to be timed may be a missed edge.
-    if device is not None and device.glitches > MISSED * edges:
-        yield make_reason("short_pulses", pulses=device.glitches)
+def is_wrong(reasons: Iterable[Reason]) -> bool:
+    """Whether a drop is void for more than its release skew, which other gates would not mend."""
+    void = {reason.code for reason in reasons if reason.severity is Severity.VOID}
+    return bool(void - {"release_skew"})
 
 
-def _air(fit: Fit) -> dict[str, tuple[Reason, ...]]:
-    """Return reasons about the fitted drag, by code; each is empty if drag is plausible.
+def _doubts(fit: Fit, drop: Drop, unmatched: Collection[UnmatchedEdge]) -> Iterable[Check]:
+    """Return checks of a fit and of the device's certificate."""
+    estimate, device, edges = fit.estimate, drop.certificate, max(1, len(drop.edges))
+    late, glitches = (device.late, device.glitches) if device else (0, 0)
+    later = sum(edge.kind == "later passage" for edge in unmatched)
+    return [
+        ("scatter", estimate.scatter > RESTLESS, {"factor": estimate.scatter}),
+        ("not_converged", not estimate.settled, {}),
+        ("late_stamps", late > LATE * edges, {"edges": late}),
+        # A pulse too short to be timed may be a missed edge.
+        ("short_pulses", glitches > MISSED * edges, {"pulses": glitches}),
+        ("later_passages", later > 0, {"edges": later}),
+    ]
+
+
+def _air(fit: Fit) -> Iterable[Check]:
+    """Return checks of the fitted drag.
 
     ``air``: κ differs from the stated value. ``air_implausible``: κ is far from its prior and the
     edges still do not fit, so that this is no fall. ``air_accelerates``: κ is negative, which is
@@ -169,14 +180,9 @@ def _air(fit: Fit) -> dict[str, tuple[Reason, ...]]:
     # Estimate by the edges alone, without the prior.
     share = 1.0 / (1.0 - min(variance, 0.9))
     alone = {"kappa": kappa + (share - 1.0) * off, "U95": 2.0 * math.sqrt(share) * u}
-    blown = estimate.scatter > RESTLESS and abs(off) > APART * sd
-    table: dict[str, tuple[bool, dict[str, float]]] = {
-        "air": (model.protocol.drag is not None and abs(off) > STRAY * sd, alone),
-        "air_implausible": (blown, {"kappa": kappa, "factor": estimate.scatter}),
-        "air_accelerates": (kappa < -_SURE * u, {"kappa": kappa, "U95": 2.0 * u}),
-    }
-    words = model.protocol.vocabulary
-    return {
-        code: (make_reason(code, words, **values),) if holds else ()
-        for code, (holds, values) in table.items()
-    }
+    implausible = estimate.scatter > RESTLESS and abs(off) > APART * sd
+    return [
+        ("air", model.protocol.drag is not None and abs(off) > STRAY * sd, alone),
+        ("air_implausible", implausible, {"kappa": kappa, "factor": estimate.scatter}),
+        ("air_accelerates", kappa < -_SURE * u, {"kappa": kappa, "U95": 2.0 * u}),
+    ]

@@ -9,7 +9,7 @@ from bench.studies.diagnoses import judged
 from bench.studies.layout_catalogue import KINDS, STANDARD, GateLayout, Kind, graded, under
 from bench.studies.wrong_rigs import WRONG_RIGS
 from rig.analysis.drop import DropCase
-from rig.analysis.faults import faults, upside_down
+from rig.analysis.faults import Premise, Suspects, faults, upside_down
 from rig.analysis.result import GOOD
 from rig.clock.calibration import TimeScale
 from rig.protocol.plan import runs
@@ -178,7 +178,7 @@ def test_a_post_of_two_gates_may_stand_wrong_and_of_one_it_is_the_gate():
         few = replace(UNIFORM, gates=replace(UNIFORM.gates, gates=gates))
         posts = [
             fault.values(0.01, 0.001)["side"]
-            for fault in faults(few, runs(few)[0], ())
+            for fault in faults(Premise(few, runs(few)[0], 1.0), Suspects())
             if fault.code == "post"
         ]
         assert sorted(posts) == ["free", "impact"][2 - count :]
