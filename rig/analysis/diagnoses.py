@@ -57,6 +57,16 @@ class GateCount(NamedTuple):
         return self.train.times.size - 1 - int(self.match.max(initial=-1))
 
     @property
+    def due(self) -> int:
+        """Number of rods that should pass."""
+        return np.unique(self.train.rods).size
+
+    @property
+    def hidden(self) -> int:
+        """Number of rods with a missing edge."""
+        return np.unique(self.train.rods[self.match < 0]).size
+
+    @property
     def unseen(self) -> Index:
         """Rods without a matched edge."""
         return np.setdiff1d(self.train.rods, self.train.rods[self.match >= 0])
@@ -142,7 +152,7 @@ def _values(protocol: Protocol, train: EdgeTrain) -> dict[str, Any]:
 def gates_too_low(
     protocol: Protocol, records: Iterable[ChainRecord], begun: Begun | None
 ) -> tuple[int, ...]:
-    """Return the lowest gates beside the striking chain that miss more edges than by chance.
+    """Return the lowest gates beside the striking chain that miss more rods than by chance.
 
     There, rods strike before they pass, or lie in the beam. The highest gate is never left out.
     The rate of chance misses is that of all other gates.
@@ -161,12 +171,13 @@ def gates_too_low(
     """
     assert protocol.gates is not None
     counts = gate_counts(records, None if begun is None else begun.matches)
-    due, missing = sum(gate.match.size for gate in counts), sum(gate.missing for gate in counts)
+    due, hidden = sum(gate.due for gate in counts), sum(gate.hidden for gate in counts)
     struck, gates = [gate for gate in counts if gate.role == "impact"], protocol.gates.gates
     low: list[int] = []
     for gate in sorted(struck, key=lambda gate: gates[gate.train.gate].height)[:-1]:
-        due, missing = due - gate.match.size, missing - gate.missing
-        if gate.missing <= most_by_chance(gate.match.size, max(MISSED, missing / due)):
+        due, hidden = due - gate.due, hidden - gate.hidden
+        missed = MISSED * gate.match.size / gate.due  # each edge of a rod may be missed
+        if gate.hidden <= most_by_chance(gate.due, max(missed, hidden / due)):
             break
         low.append(gate.train.gate)
     return tuple(low)

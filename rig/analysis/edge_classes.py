@@ -93,7 +93,7 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
     clock, gates, gravity = model.rate(x), model.protocol.gates.gates, model.protocol.gravity.value
     unmatched: list[UnmatchedEdge] = []
     for role, record in model.records.items():
-        path = model.trajectory(role, x)
+        path, none = model.trajectory(role, x), np.zeros(0, dtype=np.intp)
         lowest = min(gates[train.gate].height for train in record.trains)
         due = path.times(model.all_levels(role, x)) / clock
         for train, expected, match in record.by_gate(drop.matches[role]):
@@ -110,8 +110,8 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
                 }
                 unmatched += _surplus(gate.channel, train, match, classes)
         for train in record.aside:
-            every, none = np.isfinite(train.times), np.zeros(0, dtype=np.intp)
-            unmatched += _surplus(gates[train.gate].channel, train, none, {"left out": every}, 0.0)
+            classes = {"left out": train.burst >= 0.0}
+            unmatched += _surplus(gates[train.gate].channel, train, none, classes)
     return tuple(sorted(unmatched, key=lambda edge: edge.time_s))
 
 
@@ -136,11 +136,7 @@ def _absent(
 
 
 def _surplus(
-    channel: int,
-    train: EdgeTrain,
-    match: Index,
-    classes: Mapping[EdgeClass, Flags],
-    cost: float = SURPLUS,
+    channel: int, train: EdgeTrain, match: Index, classes: Mapping[EdgeClass, Flags]
 ) -> Iterator[UnmatchedEdge]:
     """Yield the observed edges of a gate that belong to no rod, with the first class that holds.
 
@@ -155,6 +151,7 @@ def _surplus(
         kind = next((kind for kind, holds in classes.items() if holds[at]), UNEXPLAINED)
         kind, rod = ("chatter", int(near[0])) if near.size else (kind, None)
         when, blocked, edge = float(train.times[at]), bool(train.blocked[at]), int(train.edge[at])
+        cost = 0.0 if kind == "left out" else SURPLUS
         yield UnmatchedEdge(kind, channel, when, blocked, rod, edge, cost)
 
 

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rig.analysis.air import prior_air
-from rig.analysis.annealing import LEAST, MISSED
+from rig.analysis.annealing import MISSED
 from rig.analysis.chain_records import ChainRecord, chain_records
 from rig.analysis.components import Components
 from rig.analysis.diagnoses import RIGHT
@@ -67,15 +67,15 @@ class Explanation(NamedTuple):
         The fault.
     values
         Values of the reason that names it.
-    log_odds
-        Log odds against the stated protocol.
+    evidence
+        Log marginal likelihood with the fault, less the cost of its prior probability.
     whole
         Whether it explains nearly all edges.
     """
 
     fault: Fault
-    values: Mapping[str, Any] = {}
-    log_odds: float = 0.0
+    values: Mapping[str, Any]
+    evidence: float
     whole: bool = True
 
 
@@ -125,16 +125,20 @@ class Explainer:
         """
         if fit is not None and not self._is_odd(fit, reasons):
             return (*reasons,)
-        causes = [cause for cause in self._explain(fit) if cause.whole]
-        best, rival, *_ = [*causes, *2 * [Explanation(_NEITHER)]]
-        if best.log_odds < CLEAR or best.fault is _NEITHER:
+        whole = sorted((cause for cause in self._explain(fit) if cause.whole), key=_evidence)
+        # A fault found by score and by votes counts once.
+        ranked = [*{id(cause.fault): cause for cause in whole}.values()]
+        ranked.sort(key=_evidence, reverse=True)
+        neither = next(cause.evidence for cause in ranked if cause.fault is _NEITHER)
+        if ranked[0].evidence < neither + CLEAR:
             return (*reasons,)
-        words, lead = self.stated.protocol.vocabulary, best.log_odds - rival.log_odds
+        best, rival, *_ = ranked
+        words, lead = self.stated.protocol.vocabulary, best.evidence - rival.evidence
         if lead > CLEAR:
             why = make_reason(best.fault.code, words, **best.values, log_odds=lead)
         else:
-            likeliest = [cause for cause in causes if cause.fault is not _NEITHER][:_NAMED]
-            candidates = [{"code": cause.fault.code, "values": cause.values} for cause in likeliest]
+            likely = [cause for cause in ranked if cause.evidence > neither][:_NAMED]
+            candidates = [{"code": cause.fault.code, "values": cause.values} for cause in likely]
             why = make_reason("unclear_fault", words, candidates=candidates)
         return (*(reason for reason in reasons if reason.code not in _ACCUSING), why)
 
@@ -143,83 +147,54 @@ class Explainer:
         if any(reason.code in _ACCUSING for reason in reasons) or not well_read(fit):
             return True
         rods = any(self.suspects.rods.values()) or self.suspects.more
-        return rods or self._suggests_fault(fit)
+        return rods or self._suggests_fault(fit, self.stated)
 
-    def _suggests_fault(self, fit: Fit, premise: Premise | None = None) -> bool:
+    def _suggests_fault(self, fit: Fit, premise: Premise) -> bool:
         """Whether the score test of a fitted drop favours a fault beyond those of its premise."""
-        return bool((self._score_odds(fit, premise or self.stated) > CLEAR).any())
+        return bool((self._score_odds(fit, premise) > CLEAR).any())
 
-    def _explain(self, fit: Fit | None) -> list[Explanation]:
-        """Return the faults that are likelier than none, the likeliest first."""
+    def _explain(self, fit: Fit | None) -> Iterator[Explanation]:
+        """Yield faults that may explain the drop, and the hypothesis that there is none."""
         sized, discrete = self._faults
         if fit is None:
-            records = self._records(self.stated)
-            if any(possible(record) < LEAST * record.edge_count for record in records):
-                return []  # too few edges for any fall
-            log_evidence = sum(self._read_alone(record) for record in records)
-            explanations = [*self._by_votes([*sized, *discrete], log_evidence)]
-        else:
-            reading, well = weigh(fit), well_read(fit)
-            log_evidence = self._absolute(reading, self.stated.hz)
-            explanations = [
-                *self._along(fit, log_evidence, well),
-                *self._by_votes(discrete, log_evidence),
-            ]
-            likelier = [cause for cause in explanations if cause.log_odds > 0.0]
-            likeliest = max(likelier, key=_log_odds, default=None)
-            explained = likeliest and likeliest.whole and likeliest.fault.continuous
-            if not explained and (likelier or not well):
-                # A chain with a surplus rod looks like another drop height. A score test that
-                # starts a rod's distance away cannot see that.
-                explanations += self._by_votes(sized, log_evidence)
-            if any(cause.whole and cause.log_odds > CLEAR for cause in explanations):
-                explanations += self._beyond(fit, log_evidence)
-        # A fault found by score and by votes counts once.
-        best = {id(cause.fault): cause for cause in sorted(explanations, key=_log_odds)}
-        likely = [cause for cause in best.values() if cause.log_odds > 0.0]
-        return sorted(likely, key=_log_odds, reverse=True)
+            evidence = sum(map(self._read_alone, self._records(self.stated)))
+            yield Explanation(_NEITHER, {}, evidence)
+            yield from self._by_votes([*sized, *discrete])
+            return
+        stated = Explanation(_NEITHER, {}, self._evidence(weigh(fit), self.stated.hz))
+        causes = [stated, *self._along(fit), *self._by_votes(discrete)]
+        best = max(causes, key=_evidence)
+        if not (best.whole and best.fault.continuous) and (
+            best is not stated or not well_read(fit)
+        ):
+            # A chain with a surplus rod looks like another drop height. A score test that starts a
+            # rod's distance away cannot see that.
+            causes += self._by_votes(sized)
+        yield from causes
+        if "stretch" in fit.model.unknowns:
+            # The fall may depart from the equations, without a fault.
+            scales = self.components
+            wider = replace(
+                scales, stretch=_BEYOND * scales.stretch, landed=_BEYOND * scales.landed
+            )
+            reading = weigh(settle(fit.model.copy_with(components=wider), x=fit.x.copy()))
+            yield Explanation(_NEITHER, {}, self._evidence(reading, self.stated.hz) - CLEAR)
 
     def _read_alone(self, record: ChainRecord) -> float:
         """Return the evidence of a side by itself, for a drop that was not identified."""
         reading = read_quickly(self.stated.protocol, [record], self.clock_u, self.components)
         if reading is None:
             return record.edge_count * math.log(MISSED)
-        return self._absolute(reading, self.stated.hz)
+        return self._evidence(reading, self.stated.hz)
 
-    def _along(self, fit: Fit, log_evidence: float, well: bool) -> Iterator[Explanation]:
+    def _along(self, fit: Fit) -> Iterator[Explanation]:
         """Yield fits of the continuous faults with the largest gain by the score test."""
         gains = self._score_odds(fit, self.stated)
         # For a good reading the score test excludes faults without gain. A fault may also remove
         # the penalty for negative drag.
-        least = min(0.0, held_back(fit)) if well else -math.inf
+        least = min(0.0, held_back(fit)) if well_read(fit) else -math.inf
         for n in [int(n) for n in np.argsort(-gains) if gains[n] > least][:_TRIED]:
-            yield from self._fit_size(self._faults[0][n], 0.0, fit, log_evidence)
-
-    def _beyond(self, fit: Fit, log_evidence: float) -> Iterator[Explanation]:
-        """Yield the rival hypothesis that the fall departs from the equations, without a fault."""
-        if "stretch" not in fit.model.unknowns:
-            return
-        scales = self.components
-        wider = replace(scales, stretch=_BEYOND * scales.stretch, landed=_BEYOND * scales.landed)
-        reading = weigh(settle(fit.model.copy_with(components=wider), x=fit.x.copy()))
-        log_odds = self._absolute(reading, self.stated.hz) - CLEAR - log_evidence
-        yield Explanation(_NEITHER, {}, log_odds)
-
-    def _absolute(self, reading: Reading, hz: float) -> float:
-        """Return the evidence of a reading, comparable between premises.
-
-        Two corrections apply: the density of times is converted to ticks, and the reference of
-        all rods missed depends on the number of expected rods. A rod missed at a gate counts once,
-        not for both edges. Otherwise a rod at an end that no gate saw by chance would count as
-        absent.
-        """
-        fit, ticks = reading.fit, len(self.drop.edges) * math.log(self.stated.hz / hz)
-        missed = sum(
-            train.rods.size - np.setdiff1d(train.rods, train.rods[match >= 0]).size
-            for role, record in fit.model.records.items()
-            for train, _, match in record.by_gate(fit.matches[role])
-        )
-        return reading.evidence + ticks + missed * math.log(MISSED)
+            yield from self._fit_size(self._faults[0][n], 0.0, fit)
 
     def _score_odds(self, fit: Fit, premise: Premise) -> Array:
         """Return the log odds of each continuous fault by its score, without its prior's cost."""
@@ -231,10 +206,27 @@ class Explainer:
         odds: Array = test.gain - np.log(np.maximum(1.0, spans / widths))
         return odds
 
+    def _evidence(self, reading: Reading, hz: float) -> float:
+        """Return the evidence of a reading, comparable between premises.
+
+        Two corrections apply: the density of times is converted to ticks, and the reference of
+        all rods missed depends on the number of expected rods. A rod missed at a gate counts once,
+        not for both edges. Otherwise a rod at an end that no gate saw by chance would count as
+        absent.
+        """
+        records, matches = reading.fit.model.records.values(), reading.fit.matches
+        ticks = len(self.drop.edges) * math.log(self.stated.hz / hz)
+        missed = sum(
+            train.rods.size - np.setdiff1d(train.rods, train.rods[match >= 0]).size
+            for record in records
+            for train, _, match in record.by_gate(matches[record.role])
+        )
+        return reading.evidence + ticks + missed * math.log(MISSED)
+
     def _records(self, premise: Premise) -> list[ChainRecord]:
         return chain_records(premise.protocol, premise.run, self.drop, premise.hz, premise.aside)
 
-    def _by_votes(self, faults: Sequence[Fault], log_evidence: float) -> Iterator[Explanation]:
+    def _by_votes(self, faults: Sequence[Fault]) -> Iterator[Explanation]:
         """Yield fits of the faults with most votes, each at its best size; best first."""
         least = self._net(self.stated)[1]
         candidates = []
@@ -247,50 +239,49 @@ class Explainer:
                 candidates.append((net, fault, size))
         candidates.sort(key=lambda row: -row[0])
         for _, fault, size in candidates[:_TRIED]:
-            yield from self._afresh(fault, size, log_evidence)
+            yield from self._afresh(fault, size)
 
     def _net(self, premise: Premise, least: float = -math.inf) -> tuple[float, int]:
         """Return the voting share of the expected edges, and votes less edges without a vote.
 
         Both are upper bounds if the second cannot reach `least`.
         """
-        records = self._records(premise)
+        records, protocol = self._records(premise), premise.protocol
+        scene = premise.hz, protocol.drop.value, protocol.gravity.value, prior_air(protocol)[0]
         expected = sum(side.edge_count for side in records)
-        most = [possible(record) for record in records]
-        votes = sum(most)
+        votes = [possible(record) for record in records]
         for n, record in enumerate(records):
-            if 2 * votes - expected < least:
+            if 2 * sum(votes) - expected < least:
                 break
-            key = expected, *_key(premise, record)
+            edges = [
+                part.tobytes() for train in record.trains for part in (train.levels, train.edge)
+            ]
+            key = record.role, *scene, *edges
             if key not in self._votes:
-                self._votes[key] = most_votes(
-                    premise.protocol, record, self.clock_u, self.components
-                )
-            votes += self._votes[key] - most[n]
-        return votes / max(1, expected), 2 * votes - expected
+                self._votes[key] = most_votes(protocol, record, self.clock_u, self.components)
+            votes[n] = self._votes[key]
+        return sum(votes) / max(1, expected), 2 * sum(votes) - expected
 
-    def _afresh(self, fault: Fault, size: float, log_evidence: float) -> Iterator[Explanation]:
+    def _afresh(self, fault: Fault, size: float) -> Iterator[Explanation]:
         """Identify the edges anew with a fault of some size, and yield it with its evidence."""
         premise = fault.change(self.stated, size)
-        reading = read_quickly(
-            premise.protocol, self._records(premise), self.clock_u, self.components
-        )
+        records = self._records(premise)
+        reading = read_quickly(premise.protocol, records, self.clock_u, self.components)
         if reading is None:
             return
+        fit, u, occam = reading.fit, 0.0, math.log(fault.ways or len(fault.sizes))
         if fault.continuous:
-            yield from self._fit_size(fault, size, reading.fit, log_evidence)
+            yield from self._fit_size(fault, size, fit)
             return
-        u, occam = 0.0, math.log(fault.ways or len(fault.sizes))
         if fault.code == "air":
             # κ was integrated out like all other unknowns.
-            fit, occam = reading.fit, 0.0
-            size = fit.model.kappa(fit.x)
-            u = float(fit.estimate.own_u[fit.model.unknowns["drag"]][0])
-        yield self._explanation(fault, size, u, reading, premise, log_evidence + occam)
+            size, u = (
+                fit.model.kappa(fit.x),
+                float(fit.estimate.own_u[fit.model.unknowns["drag"]][0]),
+            )
+        yield self._explanation(fault, fault.values(size, u), reading, premise, occam)
 
-    def _fit_size(
-        self, fault: Fault, size: float, fit: Fit, log_evidence: float
-    ) -> Iterator[Explanation]:
+    def _fit_size(self, fault: Fault, size: float, fit: Fit) -> Iterator[Explanation]:
         """Fit a drop with the size of a fault as a further unknown; yield nothing if unclear.
 
         Parameters
@@ -300,8 +291,8 @@ class Explainer:
         fit
             Fit to begin with.
         """
-        premise = fault.change(self.stated, size)
-        direction, largest = fault.direction(premise, fit.model), max(fault.sizes)
+        premise, largest = fault.change(self.stated, size), max(fault.sizes)
+        direction = fault.direction(premise, fit.model)
         score = scores(fit, [direction])
         model = fit.model.copy_with(suspects=(fault.suspect(fit.model, direction),))
         first = np.clip(score.size, -largest, largest) * np.append(score.follow, 1.0)
@@ -310,31 +301,21 @@ class Explainer:
         further, u = float(estimate.x[-1]), float(estimate.own_u[-1])
         if APART * u < abs(size + further) <= largest:
             # A smaller size may be zero, a larger size has another cause.
-            hz = premise.hz / (1.0 + model.unknowns.rate[-1] * further)
-            about = reading, premise._replace(hz=hz), log_evidence
-            yield self._explanation(fault, size + further, u, *about)
+            premise = premise._replace(hz=premise.hz / (1.0 + model.unknowns.rate[-1] * further))
+            yield self._explanation(fault, fault.values(size + further, u), reading, premise)
 
     def _explanation(
         self,
         fault: Fault,
-        size: float,
-        u: float,
+        values: Mapping[str, Any],
         reading: Reading,
         premise: Premise,
-        log_evidence: float,
+        occam: float = 0.0,
     ) -> Explanation:
-        log_odds = self._absolute(reading, premise.hz) - CLEAR - log_evidence
+        evidence = self._evidence(reading, premise.hz) - CLEAR - occam
         complete = well_read(reading.fit) and not self._suggests_fault(reading.fit, premise)
-        return Explanation(fault, fault.values(size, u), log_odds, complete)
+        return Explanation(fault, values, evidence, complete)
 
 
-def _log_odds(cause: Explanation) -> float:
-    return cause.log_odds
-
-
-def _key(premise: Premise, record: ChainRecord) -> tuple[Hashable, ...]:
-    """Return the cache key of a side's votes."""
-    protocol = premise.protocol
-    scene = premise.hz, protocol.drop.value, protocol.gravity.value, prior_air(protocol)[0]
-    edges = [part.tobytes() for train in record.trains for part in (train.levels, train.edge)]
-    return record.role, *scene, *edges
+def _evidence(cause: Explanation) -> float:
+    return cause.evidence

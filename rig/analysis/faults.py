@@ -172,29 +172,28 @@ def _continuous(
 
 def _size_faults(chains: Sequence[RodChain], name: str = "") -> Iterator[Fault]:
     """Yield the faults of the size of one chain, or of both chains together without a name."""
-    names, first = [chain.name for chain in chains], chains[0].chain
+    first, names = chains[0].chain, [chain.name for chain in chains]
     if first.rods > 1:  # a single object has neither length nor missing rods
-        longer = _of_chains(names, lambda chain, size: _stretch(chain, 1.0 + size / first.length))
         limit, step = 0.06 * first.length, 0.015 * first.length
-        yield _continuous("chain_length", longer, limit, step, name=name)
-        more = _of_chains(names, lambda chain, count: _with_more(chain, round(count) - first.rods))
+        stretched = _of_rods(names, lambda rods, size: _stretch(rods, 1.0 + size / first.length))
+        yield _continuous("chain_length", stretched, limit, step, name=name)
         counts = {*range(max(2, first.rods - _MORE), first.rods + _MORE + 1)} - {first.rods}
+        more = _of_rods(names, lambda rods, count: _add(rods, round(count) - first.rods))
         where = {"name": name, "stated": first.rods}
         yield Fault("rod_count", more, where, "rods", tuple(sorted(counts)))
     limit = _WIDER * min(chains[0].widths)
-    yield _continuous("thickness", _of_chains(names, _thicken), limit, limit, name=name)
+    yield _continuous("thickness", _of_rods(names, _thicken), limit, limit, name=name)
 
 
 def _order_faults(chain: RodChain, side: str, absent: Sequence[int]) -> Iterator[Fault]:
     """Yield the faults of a chain's order on a side: upside down, or with a gap."""
-    where, rods = {"name": chain.name, "side": side}, chain.chain.rods
-    if upside_down(chain) is not None:
-        turned = _of_chains([chain.name], lambda chain, _: upside_down(chain) or chain)
-        yield Fault("upside_down", turned, where)
+    where, count, rods = {"name": chain.name, "side": side}, chain.chain.rods, rods_of(chain)
+    if not all(alike(*pair) for pair in zip(rods, turn(rods), strict=True)):
+        yield Fault("upside_down", _of_rods([chain.name], lambda rods, _: turn(rods)), where)
     # Without a rod at an end, it has fewer rods or another drop height.
-    if numbers := tuple(rod + 1 for rod in absent if 0 < rod < rods - 1):
-        less = _of_chains([chain.name], _without_rod)
-        yield Fault("rod_missing", less, where | {"rods": rods}, "rod", numbers, ways=rods)
+    if numbers := tuple(rod + 1 for rod in absent if 0 < rod < count - 1):
+        gap = _of_rods([chain.name], lambda rods, n: [*rods[: round(n) - 1], *rods[round(n) :]])
+        yield Fault("rod_missing", gap, where | {"rods": count}, "rod", numbers, ways=count)
 
 
 def _rig_faults(stated: Premise) -> Iterator[Fault]:
@@ -264,52 +263,56 @@ def gate_values(gate: Gate) -> dict[str, Any]:
     return {"channel": gate.channel, "side": gate.side, "height_m": height}
 
 
-def _of_chains(names: Collection[str], change: Callable[[RodChain, float], RodChain]) -> Change:
+class Rod(NamedTuple):
+    """A rod of a chain, as in `RodChain`; its height is above the lowest rod, m."""
+
+    mass: float
+    height: float
+    width: float
+    diameter: float
+
+
+def rods_of(chain: RodChain) -> list[Rod]:
+    """Return the rods of a chain, bottom up."""
+    rods = zip(chain.chain.masses, chain.chain.heights, chain.widths, chain.diameters, strict=True)
+    return [Rod(*values) for values in rods]
+
+
+def _of_rods(names: Collection[str], change: Callable[[list[Rod], float], list[Rod]]) -> Change:
+    """Return the change of a premise by a change of the rods of some chains."""
+
     def changed(premise: Premise, size: float) -> Premise:
-        chains = premise.protocol.chains
-        return premise.change(chains=chains | {name: change(chains[name], size) for name in names})
+        chains = dict(premise.protocol.chains)
+        for name in names:
+            rods = change(rods_of(chains[name]), size)
+            masses, heights, widths, diameters = zip(*rods, strict=True)
+            hung = replace(chains[name].chain, masses=masses, heights=heights)
+            chains[name] = replace(chains[name], chain=hung, widths=widths, diameters=diameters)
+        return premise.change(chains=chains)
 
     return changed
 
 
-def _with_rods(chain: RodChain, order: Sequence[int], heights: Sequence[float]) -> RodChain:
-    """Return a chain of the rods numbered `order`, at other heights above the lowest, m."""
-
-    def chosen(values: tuple[float, ...]) -> tuple[float, ...]:
-        return tuple(values[n] for n in order)
-
-    hung = replace(chain.chain, masses=chosen(chain.chain.masses), heights=tuple(heights))
-    widths, diameters = chosen(chain.widths), chosen(chain.diameters)
-    return replace(chain, chain=hung, widths=widths, diameters=diameters)
+def _stretch(rods: list[Rod], by: float) -> list[Rod]:
+    return [rod._replace(height=rod.height * by) for rod in rods]
 
 
-def _stretch(chain: RodChain, by: float) -> RodChain:
-    heights = tuple(height * by for height in chain.chain.heights)
-    return replace(chain, chain=replace(chain.chain, heights=heights))
+def _thicken(rods: list[Rod], size: float) -> list[Rod]:
+    return [rod._replace(width=rod.width + size) for rod in rods]
 
 
-def _thicken(chain: RodChain, size: float) -> RodChain:
-    return replace(chain, widths=tuple(width + size for width in chain.widths))
-
-
-def _with_more(chain: RodChain, more: int) -> RodChain:
+def _add(rods: list[Rod], more: int) -> list[Rod]:
     """Return a chain with rods like the top rod added at the top, or with rods removed."""
-    heights, top = chain.chain.heights, chain.chain.rods - 1
-    order, pitch = [min(n, top) for n in range(top + 1 + more)], heights[top] - heights[top - 1]
-    return _with_rods(chain, order, [heights[k] + pitch * (n - k) for n, k in enumerate(order)])
+    top, pitch = rods[-1], rods[-1].height - rods[max(0, len(rods) - 2)].height
+    added = [top._replace(height=top.height + pitch * n) for n in range(1, more + 1)]
+    return [*rods[: len(rods) + more], *added]
 
 
-def _without_rod(chain: RodChain, number: float) -> RodChain:
-    """Return a chain without a rod, counted from 1; the others keep their places."""
-    order = [n for n in range(chain.chain.rods) if n != round(number) - 1]
-    return _with_rods(chain, order, [chain.chain.heights[n] for n in order])
+def turn(rods: list[Rod]) -> list[Rod]:
+    """Return a chain upside down."""
+    return [rod._replace(height=rods[-1].height - rod.height) for rod in rods[::-1]]
 
 
-def upside_down(chain: RodChain) -> RodChain | None:
-    """Return a chain upside down; `None` if that makes no difference."""
-    heights = chain.chain.heights
-    turned = [heights[-1] - height for height in heights[::-1]]
-    alike = all(abs(a - b) < 1e-3 for a, b in zip(turned, heights, strict=True))
-    if alike and chain.widths[::-1] == chain.widths:
-        return None
-    return _with_rods(chain, range(len(heights))[::-1], turned)
+def alike(rod: Rod, other: Rod) -> bool:
+    """Whether two rods at the same place of two chains cannot be told apart."""
+    return abs(rod.height - other.height) < 1e-3 and rod.width == other.width

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
-from typing import Any
+from collections.abc import Collection, Iterable, Iterator, Mapping
 
 from rig.analysis.annealing import MISSED
 from rig.analysis.chain_records import SIDES
@@ -21,11 +20,7 @@ from rig.measurands import RELEASE_SKEW
 from rig.protocol.protocol import Protocol, Run
 from rig.reasons import Reason, make_reason
 from rig.records import Drop
-from rig.vocabulary import Vocabulary
 from rig.wordings import Severity
-
-Check = tuple[str, bool, Mapping[str, Any]]
-"""Code of a reason, whether it holds, and its values."""
 
 LATE = 0.2
 """Share of possibly late stamps, close after another stamp, above which a remark is made. Sixteen
@@ -67,56 +62,35 @@ def judge(
     unmatched
         Edges that are missing or belong to no rod.
     """
-    protocol, words = fit.model.protocol, fit.model.protocol.vocabulary
-    reasons = [
-        *judge_record(drop, audit),
-        *_hold(_counts(protocol, audit), words),
-        *release_reasons(protocol, values),
-        *_hold(_air(fit), words),
-    ]
+    protocol = fit.model.protocol
+    reasons = [*judge_record(drop, audit), *_counts(protocol, audit)]
+    reasons += [*release_reasons(protocol, values), *_air(fit)]
     # With wrong drag, the fit says nothing about the gates.
     is_air = any(reason.code == "air" for reason in reasons)
     reasons += [why for why in gate_reasons(fit) if not is_air or why.severity < Severity.VOID]
     if verdict_of(reasons) != "void":  # else all this may be the consequence
-        reasons += [
-            *_hold(_doubts(fit, drop, unmatched), words),
-            *disagreements(values, by_passages),
-            # A drop whose α differs from the model's is still good: that is a result.
-            *other_incline(fit, run),
-        ]
+        reasons += [*_doubts(fit, drop, unmatched), *disagreements(values, by_passages)]
+        # A drop whose α differs from the model's is still good: that is a result.
+        reasons += other_incline(fit, run)
     return tuple(sorted(reasons, key=lambda reason: -reason.severity))
 
 
-def _hold(checks: Iterable[Check], words: Vocabulary) -> list[Reason]:
-    return [make_reason(code, words, **values) for code, holds, values in checks if holds]
-
-
-def _counts(protocol: Protocol, audit: Audit) -> Iterable[Check]:
-    """Return checks of missed and unexplained edges against the protocol's limits.
+def _counts(protocol: Protocol, audit: Audit) -> Iterator[Reason]:
+    """Yield reasons for missed or unexplained edges above the protocol's limits.
 
     With few edges, a single edge is a large share. So a rig with the usual rate of misses must not
     lose more than 1 drop in 1000 by chance, and a single stray pulse is tolerated.
     """
-    accept = protocol.accept
-    chance = most_by_chance(audit.edge_count, min(MISSED, accept.missed_edges / 2.0))
-    missed = {"missed": audit.missed, "expected": audit.edge_count, "limit": accept.missed_edges}
-    unexplained = {
-        "unexplained": audit.unexplained,
-        "received": audit.received,
-        "limit": accept.unexplained_edges,
-    }
-    return [
-        (
-            "edges_missed" if audit.missed > chance else "edges_missed_few",
-            audit.missed > accept.missed_edges * audit.edge_count,
-            missed,
-        ),
-        (
-            "edges_unexplained" if audit.unexplained > SIDES else "edges_unexplained_few",
-            audit.unexplained > accept.unexplained_edges * audit.received,
-            unexplained,
-        ),
-    ]
+    accept, words = protocol.accept, protocol.vocabulary
+    missed, expected, limit = audit.missed, audit.edge_count, accept.missed_edges
+    if missed > limit * expected:
+        chance = most_by_chance(expected, min(MISSED, limit / 2.0))
+        code = "edges_missed" if missed > chance else "edges_missed_few"
+        yield make_reason(code, words, missed=missed, expected=expected, limit=limit)
+    surplus, received, limit = audit.unexplained, audit.received, accept.unexplained_edges
+    if surplus > limit * received:
+        code = "edges_unexplained" if surplus > SIDES else "edges_unexplained_few"
+        yield make_reason(code, words, unexplained=surplus, received=received, limit=limit)
 
 
 def release_reasons(protocol: Protocol, values: Mapping[str, Measured]) -> tuple[Reason, ...]:
@@ -149,40 +123,37 @@ def is_wrong(reasons: Iterable[Reason]) -> bool:
     return bool(void - {"release_skew"})
 
 
-def _doubts(fit: Fit, drop: Drop, unmatched: Collection[UnmatchedEdge]) -> Iterable[Check]:
-    """Return checks of a fit and of the device's certificate."""
-    estimate, device, edges = fit.estimate, drop.certificate, max(1, len(drop.edges))
-    late, glitches = (device.late, device.glitches) if device else (0, 0)
-    later = sum(edge.kind == "later passage" for edge in unmatched)
-    return [
-        ("scatter", estimate.scatter > RESTLESS, {"factor": estimate.scatter}),
-        ("not_converged", not estimate.settled, {}),
-        ("late_stamps", late > LATE * edges, {"edges": late}),
-        # A pulse too short to be timed may be a missed edge.
-        ("short_pulses", glitches > MISSED * edges, {"pulses": glitches}),
-        ("later_passages", later > 0, {"edges": later}),
-    ]
+def _doubts(fit: Fit, drop: Drop, unmatched: Collection[UnmatchedEdge]) -> Iterator[Reason]:
+    """Yield remarks about a fit, the device's certificate, and edges after the passage."""
+    estimate, words = fit.estimate, fit.model.protocol.vocabulary
+    if estimate.scatter > RESTLESS:
+        yield make_reason("scatter", factor=estimate.scatter)
+    if not estimate.settled:
+        yield make_reason("not_converged", words)
+    device, edges = drop.certificate, max(1, len(drop.edges))
+    if device and device.late > LATE * edges:
+        yield make_reason("late_stamps", edges=device.late)
+    # A pulse too short to be timed may be a missed edge.
+    if device and device.glitches > MISSED * edges:
+        yield make_reason("short_pulses", pulses=device.glitches)
+    if later := sum(edge.kind == "later passage" for edge in unmatched):
+        yield make_reason("later_passages", words, edges=later)
 
 
-def _air(fit: Fit) -> Iterable[Check]:
-    """Return checks of the fitted drag.
-
-    ``air``: κ differs from the stated value. ``air_implausible``: κ is far from its prior and the
-    edges still do not fit, so that this is no fall. ``air_accelerates``: κ is negative, which is
-    not physical, so that some input is wrong.
-    """
-    model, estimate = fit.model, fit.estimate
+def _air(fit: Fit) -> Iterator[Reason]:
+    """Yield reasons about the fitted drag, unless it is plausible."""
+    model, estimate, words = fit.model, fit.estimate, fit.model.protocol.vocabulary
     at = model.unknowns["drag"].start
     off, sd = float(estimate.x[at]), float(estimate.sd[at])
     kappa = float(model.kappa(estimate.x))
     variance = float(estimate.inverse[at] @ estimate.inverse[at])
     u = math.sqrt(variance) * sd
-    # Estimate by the edges alone, without the prior.
-    share = 1.0 / (1.0 - min(variance, 0.9))
-    alone = {"kappa": kappa + (share - 1.0) * off, "U95": 2.0 * math.sqrt(share) * u}
-    implausible = estimate.scatter > RESTLESS and abs(off) > APART * sd
-    return [
-        ("air", model.protocol.drag is not None and abs(off) > STRAY * sd, alone),
-        ("air_implausible", implausible, {"kappa": kappa, "factor": estimate.scatter}),
-        ("air_accelerates", kappa < -_SURE * u, {"kappa": kappa, "U95": 2.0 * u}),
-    ]
+    if model.protocol.drag is not None and abs(off) > STRAY * sd:
+        # Estimate by the edges alone, without the prior.
+        share = 1.0 / (1.0 - min(variance, 0.9))
+        by_edges, u95 = kappa + (share - 1.0) * off, 2.0 * math.sqrt(share) * u
+        yield make_reason("air", words, kappa=by_edges, U95=u95)
+    if estimate.scatter > RESTLESS and abs(off) > APART * sd:  # this is no fall
+        yield make_reason("air_implausible", words, kappa=kappa, factor=estimate.scatter)
+    if kappa < -_SURE * u:  # negative drag is not physical, so that some input is wrong
+        yield make_reason("air_accelerates", words, kappa=kappa, U95=2.0 * u)

@@ -9,7 +9,7 @@ from bench.studies.diagnoses import judged
 from bench.studies.layout_catalogue import KINDS, STANDARD, GateLayout, Kind, graded, under
 from bench.studies.wrong_rigs import WRONG_RIGS
 from rig.analysis.drop import DropCase
-from rig.analysis.faults import Premise, Suspects, faults, upside_down
+from rig.analysis.faults import Premise, Suspects, faults, rods_of, turn
 from rig.analysis.result import GOOD
 from rig.clock.calibration import TimeScale
 from rig.protocol.plan import runs
@@ -53,10 +53,12 @@ def test_a_chain_that_hangs_a_rod_s_distance_higher_has_no_rod_too_many():
 
 
 def test_what_looks_the_same_both_ways_is_no_fault():
-    assert upside_down(UNIFORM.chains["A"]) is None
-    twice = upside_down(upside_down(GRADED.chains["A"]))
-    assert twice.widths == GRADED.chains["A"].widths
-    assert twice.chain.masses == GRADED.chains["A"].chain.masses
+    codes_named = {
+        fault.code for fault in faults(Premise(UNIFORM, runs(UNIFORM)[0], 1.0), Suspects())
+    }
+    assert "upside_down" not in codes_named
+    graded_rods = rods_of(GRADED.chains["A"])
+    assert turn(turn(graded_rods)) == graded_rods != turn(graded_rods)
 
 
 FEW = under(KINDS[2], (0.2, 0.65), (0.18, 0.6))
