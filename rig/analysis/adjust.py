@@ -88,7 +88,8 @@ def adjust(
 ) -> Estimate:
     """Fit all unknowns of a drop to its matched edges.
 
-    Gauss–Newton on ‖r/σ‖² + ‖(x − centre)/sd‖²; residuals beyond 4 σ weigh less (Huber).
+    Gauss–Newton on ‖r/σ‖² + ‖(x − centre)/sd‖²; residuals beyond 4 σ weigh less (Huber). Unknowns
+    without a prior do not count in the second sum.
 
     Parameters
     ----------
@@ -109,8 +110,9 @@ def adjust(
     def about(at: Array, inflation: float) -> Linearization:
         return linearize(model, matches, at, inflation)
 
-    sd = model.unknowns.sd
-    return least_squares(about, sd, x, centre, done, scatter=scatter, rough=rough)
+    at = model.unknowns
+    centre = np.where(at.flat, math.nan, 0.0 if centre is None else centre)
+    return least_squares(about, at.sd, x, centre, done, scatter=scatter, rough=rough)
 
 
 @np.errstate(all="ignore")  # a step to a NaN loss is rejected
@@ -136,7 +138,9 @@ def least_squares(
         Function of a point and a factor of scatter that returns the linearized observations.
     sd
         Prior standard uncertainties of the unknowns; 0 holds an unknown fixed.
-    x, centre, done, scatter, rough
+    centre
+        Prior means, zero if not given; NaN for an unknown without a prior.
+    x, done, scatter, rough
         As in `adjust`.
     steps
         Greatest number of steps.
@@ -258,7 +262,8 @@ class _Search:
 
     def look(self, y: Array) -> _Point:
         """Return the point `y` with its linearization."""
-        return _Point(y, self._linearize(y * self._sd, self.inflation), self._sd, y - self._prior)
+        pull = np.where(np.isnan(self._prior), 0.0, y - self._prior)
+        return _Point(y, self._linearize(y * self._sd, self.inflation), self._sd, pull)
 
     def scatter(self, point: _Point) -> float:
         """Return the scatter relative to the present assumption; 1 if it is close enough.

@@ -62,39 +62,6 @@ LEAST = 0.6
 start's votes with which another start is tried."""
 
 
-class Guess(NamedTuple):
-    """A first guess of a fall's parameters, in the order of a fall's unknowns.
-
-    Attributes
-    ----------
-    release
-        Time since the release fired, s.
-    start
-        Height of the reference point before release, m.
-    clock
-        Relative rate by which the edges' clock is slow.
-    gravity
-        m/s².
-    kappa
-        κ of the air, 1/m.
-    alpha
-        α of all impacts; 0 for a free chain.
-    """
-
-    release: float
-    start: float
-    clock: float
-    gravity: float
-    kappa: float
-    alpha: float
-
-    @classmethod
-    def from_protocol(cls, protocol: Protocol, record: ChainRecord) -> Guess:
-        """Return the guess with the protocol's values."""
-        kappa, _ = prior_air(protocol)
-        return cls(0.0, protocol.drop.value, 0.0, protocol.gravity.value, kappa, record.alpha)
-
-
 def matched(match: Index) -> tuple[Index, Index]:
     """Return the expected edges that are matched, and the observed edge of each."""
     pick = np.flatnonzero(match >= 0)
@@ -292,8 +259,9 @@ class FallFit(NamedTuple):
 
     Attributes
     ----------
-    guess
-        Parameters of the fall.
+    values
+        The fall's unknowns, shape ``(UNKNOWNS,)``: release, s since it fired; start, m; rate by
+        which the edges' clock is slow; g, m/s²; κ, 1/m; α of all impacts.
     match
         Observed edge of every expected edge, −1 if missed.
     evidence
@@ -302,7 +270,7 @@ class FallFit(NamedTuple):
         Root mean square of the edges' residuals, in σ.
     """
 
-    guess: Guess
+    values: Array
     match: Index
     evidence: float
     scatter: float
@@ -330,7 +298,7 @@ class SideFall:
     record, pairing
         The chain, and the edges of its trains.
     stated
-        Fall with the protocol's values.
+        The unknowns' values by the protocol, shape ``(UNKNOWNS,)``.
     sd
         Prior standard uncertainty of each unknown, shape ``(UNKNOWNS,)``; 0 if known exactly, and
         1 s for the release, which has no prior.
@@ -340,7 +308,7 @@ class SideFall:
 
     record: ChainRecord
     pairing: Pairing
-    stated: Guess
+    stated: Array
     sd: Array
     sigma: Array
 
@@ -355,14 +323,16 @@ class SideFall:
         sigma: Array = ONE,
     ) -> SideFall:
         """Return the model of a side with the protocol's values and priors."""
-        sd = np.zeros(UNKNOWNS)
+        stated, sd = np.zeros(UNKNOWNS), np.zeros(UNKNOWNS)
+        stated[START], stated[PULL] = protocol.drop.value, protocol.gravity.value
+        stated[ALPHA], (stated[DRAG], sd[DRAG]) = record.alpha, prior_air(protocol)
         sd[RELEASE], sd[START] = 1.0, math.hypot(protocol.drop.u, components.hang)
-        sd[CLOCK], (_, sd[DRAG]) = clock_u, prior_air(protocol)
+        sd[CLOCK] = clock_u
         sd[PULL] = ANY_GRAVITY if protocol.surface is None else protocol.gravity.u
         if record.ratios is not None:
             # Standard deviation of a uniform distribution over the range of α.
             sd[ALPHA] = (ANY_ALPHA[1] - ANY_ALPHA[0]) / math.sqrt(12.0)
-        return cls(record, pairing, Guess.from_protocol(protocol, record), sd, sigma)
+        return cls(record, pairing, stated, sd, sigma)
 
     @cached_property
     def levels(self) -> Array:
@@ -382,10 +352,10 @@ class SideFall:
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds of the unknowns: drag and gravity stay positive."""
         low, high = np.full(UNKNOWNS, -np.inf), np.full(UNKNOWNS, np.inf)
-        low[START] = LOWEST_START - self.stated.start
-        low[PULL] = -0.9 * self.stated.gravity
-        low[DRAG] = FAINT - self.stated.kappa  # below FAINT, formulas without drag apply
-        low[ALPHA], high[ALPHA] = ANY_ALPHA - np.clip(self.stated.alpha, *ANY_ALPHA)
+        low[START] = LOWEST_START - self.stated[START]
+        low[PULL] = -0.9 * self.stated[PULL]
+        low[DRAG] = FAINT - self.stated[DRAG]  # below FAINT, formulas without drag apply
+        low[ALPHA], high[ALPHA] = ANY_ALPHA - np.clip(self.stated[ALPHA], *ANY_ALPHA)
         exact = self.sd == 0.0
         unit = np.where(exact, 1.0, self.sd)
         return np.where(exact, -np.inf, low / unit), np.where(exact, np.inf, high / unit)
@@ -400,8 +370,8 @@ class SideFall:
         return by * self.sd
 
     def values(self, falls: Array) -> Array:
-        """Return falls as the values of a `Guess`, shaped like `falls`."""
-        values: Array = np.array(self.stated) + falls * self.sd
+        """Return the unknowns' values in SI units, shaped like `falls`."""
+        values: Array = self.stated + falls * self.sd
         return values
 
     def path(self, falls: Array) -> Trajectory:
@@ -492,9 +462,9 @@ class SideFall:
         off = height[edges[sides]] - self.levels[sides]
         evidence = float(log_density(off, sigma, speed[edges[sides]]).sum() - lost)
         scatter = math.sqrt(float(((off / sigma) ** 2).sum()) / max(1, sides.size))
-        guess = Guess(*self.values(fall).tolist())
-        guess = guess._replace(release=guess.release * (1.0 + guess.clock))
-        return FallFit(guess, edges, evidence if math.isfinite(evidence) else -math.inf, scatter)
+        values = self.values(fall)
+        values[RELEASE] *= 1.0 + values[CLOCK]
+        return FallFit(values, edges, evidence if math.isfinite(evidence) else -math.inf, scatter)
 
     def nodes(self) -> Array:
         """Return the grid of starting points, the likeliest first.

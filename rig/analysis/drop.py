@@ -174,7 +174,7 @@ class DropCase:
         return chain_records(self.protocol, self.run, self.drop, self.scale.hz, self.aside)
 
     def _model(self, begun: Begun) -> DropModel:
-        about = begun.guesses, self.scale.u, self.components
+        about = self.scale.u, self.components, begun.alpha
         return DropModel.of(self.protocol, self.records, *about)
 
     def _identify(
@@ -189,7 +189,7 @@ class DropCase:
     def _identify_anew(self, before: Begun | None) -> DropIdentity:
         """Identify the drop's edges; `before` is a fit of the same drop with more gates."""
         if before is not None:
-            return DropIdentity(self.scale, {}, begun=settle(self._model(before), x=before.x).begun)
+            return DropIdentity(self.scale, {}, begun=settle(self._model(before), before.x).begun)
         assert self.components is not None
         about = self.protocol, self.records, self.scale.u, self.components
         identification = identify(*about, -math.inf if self.drop.fire_tick is None else 0.0)

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from rig.analysis import annealing
 from rig.analysis.air import prior_air
-from rig.analysis.annealing import PART, Guess, Pairing, SideFall, matched
+from rig.analysis.annealing import PART, Pairing, SideFall, matched
 from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import SHARPEST, Components, priors
 from rig.analysis.discrepancy import LOWEST_START, STRETCHES, Discrepancy
@@ -21,7 +22,6 @@ from rig.analysis.trajectory import (
     COMMON,
     DRAG,
     GRAVITY,
-    RELEASE,
     START,
     Trajectory,
     free_trajectory,
@@ -48,12 +48,12 @@ class DropModel:
         The scene.
     records
         The chains with their edges.
-    guesses
-        First guess for each side, by role.
     clock_u
         Relative standard uncertainty of the time scale.
     components
         Variance components; those of the protocol if not given.
+    alpha
+        α to which the scatter of single impulses is relative; the protocol's if not given.
 
     See `DropModel.of`, which is quicker for many drops under the same conditions.
 
@@ -70,9 +70,9 @@ class DropModel:
         self,
         protocol: Protocol,
         records: Sequence[ChainRecord],
-        guesses: Mapping[str, Guess],
         clock_u: float,
         components: Components | None = None,
+        alpha: float | None = None,
     ) -> None:
         assert protocol.gates is not None
         self.protocol = protocol
@@ -80,7 +80,7 @@ class DropModel:
         self.kappa_u: float
         self._kappa, self.kappa_u = prior_air(protocol)
         self.records: dict[str, ChainRecord] = {record.role: record for record in records}
-        self.guesses = guesses
+        self.alpha: float = records[0].alpha if alpha is None else alpha
         self.clock_u: float = clock_u
         self.components: Components = components or priors(protocol)
         self.suspects: tuple[Unknown, ...] = ()
@@ -101,21 +101,15 @@ class DropModel:
         cls,
         protocol: Protocol,
         records: Sequence[ChainRecord],
-        guesses: Mapping[str, Guess] | None,
         clock_u: float,
         components: Components | None = None,
+        alpha: float | None = None,
     ) -> DropModel:
-        """Return a drop's model; parts that depend only on the condition are cached.
-
-        Parameters
-        ----------
-        guesses
-            `None` to start from the protocol's values.
-        """
+        """Return a drop's model; parts that depend only on the condition are cached."""
         content = tuple(map(_expectations, records))
         return _model_of(_Condition(protocol, content, tuple(records))).copy_with(
             records={record.role: record for record in records},
-            guesses=_stated_guesses(protocol, records) if guesses is None else guesses,
+            alpha=records[0].alpha if alpha is None else alpha,
             clock_u=clock_u,
             components=components or priors(protocol),
         )
@@ -128,14 +122,6 @@ class DropModel:
         if "suspects" in attributes:
             model.slopes = {role: side_slopes(model, role) for role in model.records}
         return model
-
-    def refer(self, x: Array, guesses: Mapping[str, Guess]) -> None:
-        """Make unknowns that are relative to other guesses relative to those of this model."""
-        for role, guess in guesses.items():
-            own, at = self.guesses[role], self.unknowns
-            x[..., at[f"{role} release"]] += guess.release - own.release
-            if role == "impact":
-                x[..., at["alpha"]] += guess.alpha - own.alpha
 
     def with_edges(self, records: Mapping[str, ChainRecord]) -> DropModel:
         """Return a copy with the edges of other records of the same condition."""
@@ -195,16 +181,26 @@ class DropModel:
             }
         )
 
-    def first(self) -> Array:
-        """Return the unknowns of the first guess, shape ``(unknowns,)``."""
-        x, guesses = np.zeros(len(self.unknowns)), self.guesses.values()
+    def released(self, releases: Mapping[str, float], alpha: float) -> Array:
+        """Return the unknowns of a drop as stated, with α and release times, s, by role."""
+        x = np.zeros(len(self.unknowns))
+        for role, release in releases.items():
+            x[self.unknowns[f"{role} release"]] = release
+        if "impact" in releases:
+            x[self.unknowns["alpha"]] = alpha
+        return x
+
+    def from_falls(self, falls: Mapping[str, Array]) -> Array:
+        """Return the unknowns for annealed falls by role, see `rig.analysis.annealing.FallFit`."""
+        releases = {role: fall[annealing.RELEASE] for role, fall in falls.items()}
+        values, at = np.array([*falls.values()]), self.unknowns
+        x = self.released(releases, values[0, annealing.ALPHA])
         # The mean of both sides: each chain's own start height deviation begins at zero.
-        start = np.mean([guess.start for guess in guesses])
-        x[self.unknowns["drop"]] = start - self.protocol.drop.value
-        x[self.unknowns["clock"]] = np.mean([guess.clock for guess in guesses])
-        if "free" in self.guesses and self.protocol.surface is None:
-            x[self.unknowns["gravity"]] = self.guesses["free"].gravity - self.protocol.gravity.value
-        x[self.unknowns["drag"]] = max(guess.kappa for guess in guesses) - self._kappa
+        x[at["drop"]] = values[:, annealing.START].mean() - self.protocol.drop.value
+        x[at["clock"]] = values[:, annealing.CLOCK].mean()
+        if self.protocol.surface is None:
+            x[at["gravity"]] = values[0, annealing.PULL] - self.protocol.gravity.value
+        x[at["drag"]] = values[:, annealing.DRAG].max() - self._kappa
         return x
 
     def rate(self, x: Array) -> float:
@@ -217,7 +213,7 @@ class DropModel:
 
     def alphas(self, x: Array) -> Array:
         """Return the mean α of the impacts of a drop, or of many."""
-        alphas: Array = self.guesses["impact"].alpha + x[..., self.unknowns["alpha"]]
+        alphas: Array = x[..., self.unknowns["alpha"]]
         return alphas
 
     def trajectory(self, role: str, x: Array) -> Trajectory:
@@ -232,7 +228,6 @@ class DropModel:
 
     def _trajectory(self, role: str, x: Array) -> Trajectory:
         record, parameters = self.records[role], x @ self.slopes[role].path.T
-        parameters[..., RELEASE] += self.guesses[role].release
         parameters[..., START] += self.protocol.drop.value
         parameters[..., GRAVITY] += self.protocol.gravity.value
         parameters[..., DRAG] += self._kappa
@@ -245,7 +240,6 @@ class DropModel:
             return free_trajectory(release, start, gravity, kappa, record.air)
         start = np.maximum(start, LOWEST_START)
         gains, places = np.split(parameters[..., COMMON:], 2, axis=-1)
-        gains += self.guesses[role].alpha
         places += record.strikes
         return struck_trajectory(
             release, start, gravity, gains, record.ratios, places, kappa, record.air
@@ -383,7 +377,7 @@ class _Condition:
 @lru_cache(maxsize=64)
 def _model_of(condition: _Condition) -> DropModel:
     protocol, records = condition.protocol, condition.records
-    model = DropModel(protocol, records, _stated_guesses(protocol, records), 0.0)
+    model = DropModel(protocol, records, 0.0)
     model.condition = condition
     return model
 
@@ -401,7 +395,3 @@ def _expectations(record: ChainRecord) -> tuple[object, ...]:
         len(record.trains),
         *(array.tobytes() for array in arrays),
     )
-
-
-def _stated_guesses(protocol: Protocol, records: Sequence[ChainRecord]) -> dict[str, Guess]:
-    return {record.role: Guess.from_protocol(protocol, record) for record in records}

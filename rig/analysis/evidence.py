@@ -90,7 +90,7 @@ class Evidence:
                 self.members(row.scale, y[:, at[name]], root[:, at[name]])
         if "impulses" in at:
             # Convert to units of α², as conditions may differ in α.
-            block, alpha = at["impulses"], abs(model.guesses["impact"].alpha)
+            block, alpha = at["impulses"], abs(model.alpha)
             squares = (y[:, block] * at.sd[block]) ** 2
             record, size = model.records["impact"], np.full(squares.shape, alpha**2)
             single = size / above(record.chain.chain) ** 2

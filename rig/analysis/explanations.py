@@ -177,7 +177,7 @@ class Explainer:
             wider = replace(
                 scales, stretch=_BEYOND * scales.stretch, landed=_BEYOND * scales.landed
             )
-            reading = weigh(settle(fit.model.copy_with(components=wider), x=fit.x.copy()))
+            reading = weigh(settle(fit.model.copy_with(components=wider), fit.x.copy()))
             yield Explanation(_NEITHER, {}, self._evidence(reading, self.stated.hz) - CLEAR)
 
     def _read_alone(self, record: ChainRecord) -> float:
@@ -296,7 +296,7 @@ class Explainer:
         score = scores(fit, [direction])
         model = fit.model.copy_with(suspects=(fault.suspect(fit.model, direction),))
         first = np.clip(score.size, -largest, largest) * np.append(score.follow, 1.0)
-        reading = weigh(settle(model, x=np.append(fit.x, 0.0) + first))
+        reading = weigh(settle(model, np.append(fit.x, 0.0) + first))
         estimate = reading.fit.estimate
         further, u = float(estimate.x[-1]), float(estimate.own_u[-1])
         if APART * u < abs(size + further) <= largest:

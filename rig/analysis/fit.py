@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from rig.analysis.adjust import Estimate, adjust
-from rig.analysis.annealing import Guess, matched
+from rig.analysis.annealing import matched
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY
 from rig.arrays import Array, Index
@@ -75,20 +74,20 @@ class Fit(DropFit):
     @property
     def begun(self) -> Begun:
         """What another fit of the drop begins with."""
-        return Begun(self.model.guesses, self.matches, self.x, self.estimate.scatter)
+        return Begun(self.model.alpha, self.matches, self.x, self.estimate.scatter)
 
 
-def settle(model: DropModel, matches: Matches | None = None, x: Array | None = None) -> Fit:
+def settle(model: DropModel, x: Array, matches: Matches | None = None) -> Fit:
     """Match and fit in turn until the matches stay the same, and return the fit.
 
     Parameters
     ----------
+    x
+        Unknowns to begin with.
     matches
         Matches to begin with, if any.
-    x
-        Unknowns to begin with; those of the guesses if not given.
     """
-    x, rough, scatter = model.first() if x is None else x, True, 1.0
+    rough, scatter = True, 1.0
     matches = match(model, x) if matches is None else matches
     for _ in range(_ROUNDS):
         # The first fit need not converge, as matches will change.
@@ -107,7 +106,7 @@ def settle(model: DropModel, matches: Matches | None = None, x: Array | None = N
 class Begun(NamedTuple):
     """State of a drop's fit at a time scale, to fit it again at another."""
 
-    guesses: Mapping[str, Guess]
+    alpha: float
     matches: Matches
     x: Array
     scatter: float
@@ -119,7 +118,7 @@ def refit_at_rate(model: DropModel, begun: Begun, rate: float) -> Fit:
     Parameters
     ----------
     model
-        Model at the new time scale, with the guesses of `begun`.
+        Model at the new time scale, with α of `begun`.
     rate
         Ratio of the new tick rate to the old.
     """

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from rig.analysis.averages import mean
-from rig.analysis.equations import standardise
 from rig.analysis.evidence import STATED_WEIGHT
 from rig.analysis.fit import Fit, count_matched
 from rig.analysis.plain_data import attributes
@@ -120,7 +119,8 @@ def free_gravity(fit: Fit) -> Measured | None:
         return None
     sd = estimate.sd.copy()
     sd[at] = ANY_GRAVITY
-    rows, pull, share = rows.triangle(), standardise(estimate.x, sd), 1.0
+    rows, pull, share = rows.triangle(), model.unknowns.pull(estimate.x), 1.0
+    pull[at] = estimate.x[at] / ANY_GRAVITY
     for _ in range(2):
         # Estimate the scatter from the residuals; the stated scatter counts as `STATED_WEIGHT`.
         rows = rows._replace(slopes=rows.slopes / share, left=rows.left / share)

@@ -17,9 +17,11 @@ from typing import TypeVar
 import numpy as np
 
 from rig.analysis.annealing import (
+    ALPHA,
     LEAST,
     MISSED,
     PEAKS,
+    RELEASE,
     FallFit,
     Pairing,
     SideFall,
@@ -28,7 +30,7 @@ from rig.analysis.annealing import (
 from rig.analysis.chain_records import SIDES, ChainRecord
 from rig.analysis.components import Components
 from rig.analysis.drop_model import DropModel
-from rig.analysis.equations import HUBER, STRAY, standardise
+from rig.analysis.equations import HUBER, STRAY
 from rig.analysis.fit import Begun, Fit, count_matched, settle
 from rig.arrays import Index
 from rig.clock.calibration import TimeScale
@@ -144,7 +146,7 @@ def identify(
     batches
         Greatest number of batches of starts, the likeliest first; all if not given.
     """
-    model = DropModel.of(protocol, records, None, clock_u, components)
+    model = DropModel.of(protocol, records, clock_u, components)
     readings = {role: _read(model.side(role), earliest, batches) for role in model.records}
     # Evidence is relative to all edges being strays and every rod missed.
     if all(side and side[0].evidence > 0.0 for side in readings.values()):
@@ -196,7 +198,7 @@ def well_read(fit: Fit) -> bool:
     matchable = sum(possible(record) for record in fit.model.records.values())
     expected = sum(record.edge_count for record in fit.model.records.values())
     many = fit.match_count >= max(LEAST * max(1, expected), _FAIR * matchable)
-    strain = float(np.abs(standardise(fit.estimate.x, fit.estimate.sd)).max())
+    strain = float(np.abs(fit.model.unknowns.pull(fit.x)).max())
     return many and fit.estimate.scatter < RESTLESS and strain < STRAY
 
 
@@ -256,7 +258,7 @@ def log_evidence(fit: Fit) -> float:
         sigma = rows.sigma * estimate.scatter
         beyond = np.maximum(np.abs(rows.values) / sigma - HUBER, 0.0)
         total += float(np.sum(log_density(rows.values, sigma, rows.speed) + 0.5 * beyond**2))
-    y = standardise(estimate.x, estimate.sd)
+    y = model.unknowns.pull(estimate.x)
     _, volume = np.linalg.slogdet(estimate.root)
     return total - 0.5 * float(y @ y) - float(volume) + held_back(fit)
 
@@ -275,7 +277,7 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[FallFit]]) -> Id
     """Fit the likeliest pairs of both sides' readings, and return the best with its odds."""
     pairs = []
     for pair in itertools.product(*readings.values()):
-        together = _simultaneous(model.protocol, [side.guess.release for side in pair])
+        together = _simultaneous(model.protocol, [side.values[RELEASE] for side in pair])
         pairs.append((sum(side.evidence for side in pair) + together, pair))
     pairs.sort(key=lambda row: -row[0])
     likeliest = pairs[0][0]
@@ -283,8 +285,10 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[FallFit]]) -> Id
     tried: list[Reading] = []
     for pair in close:
         sides = dict(zip(readings, pair, strict=True))
-        begun = model.copy_with(guesses={role: side.guess for role, side in sides.items()})
-        tried.append(weigh(settle(begun, {role: side.match for role, side in sides.items()})))
+        x = model.from_falls({role: side.values for role, side in sides.items()})
+        alpha = sides["impact"].values[ALPHA] if "impact" in sides else 0.0
+        matches = {role: side.match for role, side in sides.items()}
+        tried.append(weigh(settle(model.copy_with(alpha=alpha), x, matches)))
     best, *rest = _rank_readings(tried)
     shares = _shares(model, {role: count_matched(side) for role, side in best.fit.matches.items()})
     if not best.evidence > 0.0:

@@ -291,11 +291,7 @@ def _steady(old: Components, new: Components, groups: Sequence[DropGroup]) -> bo
     """
     names = [name for name in old.__slots__ if name not in ("impulse", "impulse_floor", "bounce")]
     pairs = [(getattr(old, name), getattr(new, name), _LEAST.get(name, 0.0)) for name in names]
-    alphas = {
-        abs(group.model.guesses["impact"].alpha)
-        for group in groups
-        if "impact" in group.model.guesses
-    }
+    alphas = {abs(group.model.alpha) for group in groups if "impact" in group.model.records}
     ends = np.array([1.0, math.inf])
     pairs += [
         (a, b, 0.0)

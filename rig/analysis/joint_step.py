@@ -128,8 +128,6 @@ def group_drops(fits: Sequence[DropFit], shared: SharedUnknowns) -> list[DropGro
         for places in (numbers[n : n + count] for n in range(0, len(numbers), count)):
             drops = [fits[n] for n in places]
             x = np.array([drop.x for drop in drops])
-            for row, drop in zip(x, drops, strict=True):
-                model.refer(row, drop.model.guesses)
             records = [drop.model.records for drop in drops]
             matches = [drop.matches for drop in drops]
             edges = _edges([model.with_edges(each) for each in records], matches, x)
@@ -142,17 +140,15 @@ def with_priors(groups: Sequence[DropGroup], components: Components) -> list[Dro
     """Return drops with other priors; those of impulses are relative to a condition's mean α."""
     alphas: dict[object, list[Array]] = {}
     for group in groups:
-        if "impact" in group.model.guesses:
+        if "impact" in group.model.records:
             alphas.setdefault(group.model.condition, []).append(group.model.alphas(group.x))
     changed = []
     for group in groups:
-        guesses = dict(group.model.guesses)
-        if of_condition := alphas.get(group.model.condition):
-            mean = float(np.concatenate(of_condition).mean())
-            guesses["impact"] = guesses["impact"]._replace(alpha=mean)
-        model, x = group.model.copy_with(components=components, guesses=guesses), group.x.copy()
-        model.refer(x, group.model.guesses)
-        changed.append(replace(group, model=model, x=x))
+        of_condition = alphas.get(group.model.condition)
+        alpha = float(np.concatenate(of_condition).mean()) if of_condition else 0.0
+        changed.append(
+            replace(group, model=group.model.copy_with(components=components, alpha=alpha))
+        )
     return changed
 
 
@@ -162,7 +158,7 @@ def _edges(models: Sequence[DropModel], matches: Sequence[Matches], x: Array) ->
         times = np.empty((len(models), expected.rods.size))
         burst = np.full(times.shape, np.inf)
         # Any moment after the release: at rest, a chain has no uncertainty.
-        fallen = x[:, at[f"{role} release"]] + models[0].guesses[role].release + 1.0
+        fallen = x[:, at[f"{role} release"]] + 1.0
         for n, model in enumerate(models):
             pairing = model.pairings[role]
             pick, edge = matched(matches[n][role])
@@ -192,11 +188,10 @@ def joint_step(
     """
     sd, rows, reduced = np.zeros(x.size), list[EquationRows](), []
     for group in groups:
-        own_sd, pull = group.model.unknowns.sd, np.zeros(group.x.shape)
-        sd[group.here] = own_sd[group.common]
-        pull[:, group.own] = standardise(group.x[:, group.own], own_sd[group.own])
+        at = group.model.unknowns
+        sd[group.here] = at.sd[group.common]
         blocks = [*linearize(group.model, group.edges, group.x, cut=cut).rows.values()]
-        part = eliminate(blocks, own_sd, pull, group.own, group.common)
+        part = eliminate(blocks, at.sd, at.pull(group.x), group.own, group.common)
         slopes = part.rest.slopes.reshape(-1, group.here.size)
         rows = condense([*rows, EquationRows(slopes, part.rest.left.ravel(), group.here)], x.size)
         used = part.rest._replace(slopes=slopes[:0].copy(), left=slopes[:0, 0].copy())

@@ -14,7 +14,6 @@ import numpy as np
 
 from rig.analysis.annealing import matched
 from rig.analysis.chain_records import SIDES
-from rig.analysis.equations import standardise
 from rig.analysis.fit import Fit
 from rig.analysis.quantities import COMPUTED, AdjustedDrop
 from rig.analysis.result import Measured
@@ -41,7 +40,7 @@ def last_passages(fit: Fit) -> dict[str, Measured]:
         return {}
     end = rows._replace(slopes=rows.slopes[last], left=rows.left[last])
     root = square_root(
-        [*{**estimate.rows, "impact": end}.values()], sd, standardise(estimate.x, sd)
+        [*{**estimate.rows, "impact": end}.values()], sd, model.unknowns.pull(estimate.x)
     )
     step, inverse = root.step(), np.linalg.inv(root.matrix)
     drop, values = AdjustedDrop(model, estimate.x), {}

@@ -60,8 +60,7 @@ class Likeness(NamedTuple):
 
 def likeness(joint: JointFit) -> Likeness | None:
     """Return the likeness of a session's falls; `None` without strikes, or with too few edges."""
-    guesses = [drop.model.guesses.get("impact") for drop in joint.drops]
-    alpha = median([abs(guess.alpha) for guess in guesses if guess] or [0.0])
+    alpha = median([abs(drop.model.alpha) for drop in joint.drops])
     scales, degrees = joint.components, joint.degrees
     if alpha <= 0.0 or degrees.get("departure", 0.0) < ENOUGH:
         return None

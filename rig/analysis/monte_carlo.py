@@ -14,7 +14,6 @@ from rig.analysis.distributions import coverage_factor
 from rig.analysis.drop_model import DropModel
 from rig.analysis.fit import Fit
 from rig.analysis.quantities import measurands
-from rig.analysis.unknowns import ANYTHING
 from rig.arrays import Array
 from rig.threads import one_thread
 
@@ -65,7 +64,8 @@ def monte_carlo(fit: Fit, trials: int, seed: int) -> dict[str, TrialStats]:
         Seed of the generator; the same seed gives the same trials.
     """
     rng = np.random.default_rng(seed)
-    at, sd = fit.estimate.x, np.where(fit.estimate.sd < ANYTHING, fit.estimate.sd, 0.0)
+    at, unknowns = fit.estimate.x, fit.model.unknowns
+    sd = np.where(unknowns.flat, 0.0, unknowns.sd)  # unknowns without a prior are not drawn
     values: dict[str, list[float]] = {}  # a shifted top rod may never strike
     for _ in range(trials):
         shaken = _shake(fit, rng)

@@ -155,7 +155,7 @@ class AdjustedDrop:
 
     def release(self, role: str) -> Dual:
         """Return the release time of a chain, s."""
-        return self.linear(f"{role} release") + self.model.guesses[role].release
+        return self.linear(f"{role} release")
 
     def levels(self, role: str, times: Dual) -> Dual:
         """Return the height of a chain's reference point at `times`, m; shape ``(n,)``."""

@@ -21,10 +21,10 @@ from rig.analysis.air import lags, prior_air, slack
 from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import Components, above
 from rig.analysis.discrepancy import MODES
-from rig.analysis.equations import ExpectedEdges
+from rig.analysis.equations import ExpectedEdges, standardise
 from rig.analysis.swing import drawn, lever, swing_sd
 from rig.analysis.trajectory import COMMON, DRAG, GRAVITY, RELEASE, START
-from rig.arrays import Array, Index
+from rig.arrays import Array, Flags, Index
 from rig.protocol.protocol import Gates, Protocol
 
 if TYPE_CHECKING:
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
     Effect = Callable[["Side"], Array]
 
-ANYTHING = 1.0
-"""Prior standard uncertainty of release times (s) and of α: uninformative."""
 ANY_GRAVITY = 5.0
 """Prior standard uncertainty of gravity where it is the measurand, m/s²."""
 
@@ -67,8 +65,8 @@ class Side(NamedTuple):
 
     @property
     def alpha(self) -> float:
-        """First guess of the impact coefficient α, absolute value."""
-        return abs(self.model.guesses["impact"].alpha)
+        """Impact coefficient α to which the scatter of single impulses is relative, absolute."""
+        return abs(self.model.alpha)
 
     @property
     def slope(self) -> float:
@@ -92,8 +90,8 @@ class Unknown:
     line
         Line of the uncertainty budget.
     sd
-        Prior standard uncertainties of the members, before `scale`; `None` if the scene does not
-        have this unknown.
+        Prior standard uncertainties of the members, before `scale`; infinite without a prior,
+        `None` if the scene does not have this unknown.
     of
         Chains that the unknown acts on: ``impact`` or ``free`` for one of them, ``each`` if each
         chain has its own value, ``all`` if both share a value.
@@ -325,7 +323,7 @@ TABLE = (
     ),
     _beams("ripple", "beam offsets", _ripple_sd, level=_beam_ripple, scale="beam"),
     _chain(  # Only edges determine the release, so its uncertainty belongs to their line.
-        "release", "edges", lambda _: ANYTHING, moves="release"
+        "release", "edges", lambda _: math.inf, moves="release"
     ),
     _chain("hang", "start height", _all, moves="start", scale="hang"),
     _chain(
@@ -360,7 +358,7 @@ TABLE = (
         level=lambda side: side.edges.drawn,
         scale="swing",
     ),
-    _struck("alpha", "edges", lambda _: ANYTHING, moves="gains"),
+    _struck("alpha", "edges", lambda _: math.inf, moves="gains"),
     _struck(
         "impulses",
         "single impulses",
@@ -418,7 +416,7 @@ TABLE = (
 class Unknowns:
     """The vector of a drop's unknowns, divided into named blocks.
 
-    All values are deviations from the nominal scene, so the prior mean is zero everywhere.
+    All values are deviations from the protocol, but for release times and α, which have no prior.
 
     Attributes
     ----------
@@ -430,7 +428,9 @@ class Unknowns:
     groups
         Blocks of each line of the uncertainty budget.
     sd
-        Prior standard uncertainties, shape ``(unknowns,)``.
+        Prior standard uncertainties, shape ``(unknowns,)``; 1 in SI units without a prior.
+    flat
+        Whether an unknown has no prior, shape ``(unknowns,)``.
     rate
         Derivatives of the time scale, see `Unknown.rate`; shape ``(unknowns,)``.
     """
@@ -452,8 +452,14 @@ class Unknowns:
             priors.append(prior)
             rates.append(np.full(prior.size, row.rate))
             size = block.stop
-        self.sd: Array = np.concatenate(priors)
+        sd: Array = np.concatenate(priors)
+        self.flat: Flags = np.isinf(sd)
+        self.sd: Array = np.where(self.flat, 1.0, sd)
         self.rate: Array = np.concatenate(rates)
+
+    def pull(self, x: Array) -> Array:
+        """Return deviations from the priors in their standard uncertainties; 0 without a prior."""
+        return np.where(self.flat, 0.0, standardise(x, self.sd))
 
     def __len__(self) -> int:
         return self.sd.size

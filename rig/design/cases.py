@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.annealing import Guess
 from rig.analysis.chain_records import ChainRecord, EdgeTrain, chain_records
 from rig.analysis.components import Components
 from rig.analysis.drop_model import DropModel
@@ -96,7 +95,7 @@ def cases(protocol: Protocol, components: Components) -> tuple[Case, ...]:
     for run in kinds:
         model, x = predict_drop(at_contact(protocol, run.incline_deg, run.impact), run, components)
         seen = perfect(model, x)
-        models.append((DropModel(model.protocol, seen, model.guesses, CLOCK_U, components), x))
+        models.append((DropModel(model.protocol, seen, CLOCK_U, components), x))
     shared = SharedUnknowns(model for model, _ in models)
     # Beams are left out here and added by each layout: the rest is worked out once for all.
     places = np.full(len(shared), -1)
@@ -127,10 +126,8 @@ def predict_drop(protocol: Protocol, run: Run, components: Components) -> tuple[
     if run.impact is not None:
         chain = protocol.chains[run.impact].chain
         alpha, _ = model_alpha(protocol, chain, run.incline_deg, {})
-    guess = Guess(RELEASE_S, protocol.drop.value, 0.0, protocol.gravity.value, 0.0, alpha)
-    guesses: dict[str, Guess] = {record.role: guess for record in records}
-    model = DropModel(protocol, records, guesses, CLOCK_U, components)
-    return model, np.zeros(len(model.unknowns))
+    model = DropModel(protocol, records, CLOCK_U, components, alpha)
+    return model, model.released(dict.fromkeys(model.records, RELEASE_S), alpha)
 
 
 def perfect(model: DropModel, x: Array) -> list[ChainRecord]:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.analysis.annealing import Guess
 from rig.analysis.chain_records import ChainRecord, EdgeArrays, edge_train
 from rig.analysis.components import Components
 from rig.analysis.drop import DropCase
@@ -95,30 +94,15 @@ class Case:
         """The best reading of the edges."""
         return identify(self.protocol, self.records, self.scale.u, STATED)
 
-    def guesses(self) -> dict[str, Guess]:
-        """Where the best reading has each chain begin."""
+    def model(self) -> tuple[DropModel, dict, np.ndarray]:
+        """The observation equations of this drop, its fall, and the matches that it gives."""
         fit = self.identify().fit
-        assert fit is not None
-        paths = {role: fit.model.trajectory(role, fit.x) for role in fit.model.records}
-        at = fit.model.unknowns
-        return {
-            role: Guess(
-                path.time[0],
-                path.height[0],
-                fit.x[at["clock"]][0],
-                self.protocol.gravity.value,
-                fit.model.kappa(fit.x),
-                float(fit.model.alphas(fit.x)[0]) if role == "impact" else 0.0,
-            )
-            for role, path in paths.items()
-        }
-
-    def model(self) -> tuple[DropModel, dict]:
-        """The observation equations of this drop, and the matches that the first guess gives."""
-        model = DropModel(self.protocol, self.records, self.guesses(), self.scale.u)
-        x = model.first()
-        matches = match(model, x)
-        return model, matches
+        x, at = np.zeros(fit.x.size), fit.model.unknowns
+        for name in ("impact release", "free release", "alpha", "clock", "drag", "drop"):
+            if name in at:
+                x[at[name]] = fit.x[at[name]]
+        model = DropModel(self.protocol, self.records, self.scale.u, alpha=fit.model.alpha)
+        return model, match(model, x), x
 
 
 def impact_ratios(chain: Chain) -> np.ndarray:

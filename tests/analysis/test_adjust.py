@@ -19,7 +19,7 @@ class Linear:
 
     def __init__(self, seed: int, noise: float = 0.5, outlier: float = 0.0) -> None:
         rng = np.random.default_rng(seed)
-        self.unknowns = SimpleNamespace(sd=PRIOR)
+        self.unknowns = SimpleNamespace(sd=PRIOR, flat=np.zeros(5, np.bool_))
         self.jacobian = {role: rng.normal(size=(12, 5)) for role in ("impact", "free")}
         self.sigma = {role: rng.uniform(0.5, 2.0, 12) for role in ("impact", "free")}
         true = PRIOR * rng.normal(size=5) * 0.5

@@ -86,8 +86,9 @@ def test_a_chain_of_another_wood_needs_not_fall_as_its_width_says():
 def test_a_chain_arrives_when_its_top_rod_does(block):
     """By what it is off its place in the chain, too."""
     records = [record_of("graded", role) for role in ("impact", "free")]
-    model = DropModel.of(SCENES["graded"], records, None, 0.0)
-    x, level = model.first(), -model.records["impact"].strikes[-1:]
+    model = DropModel.of(SCENES["graded"], records, 0.0)
+    x, level = np.zeros(len(model.unknowns)), -model.records["impact"].strikes[-1:]
+    x[model.unknowns["alpha"]] = model.alpha
     x[model.unknowns[block]] = 1e-3
     drop = AdjustedDrop(model, x)
     moment = Dual(np.array([drop.hit.value]), drop.hit.slopes[None])

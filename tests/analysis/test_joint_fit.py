@@ -48,7 +48,7 @@ class Whole:
                 slopes, there = rows.slopes * sd[rows.columns], place[rows.columns]
                 self.data[np.ix_(there, there)] += slopes.T @ slopes
                 self.vector[there] += slopes.T @ rows.left
-            self.x[place] = np.divide(drop.x, sd, out=np.zeros_like(sd), where=sd > 0)
+            self.x[place] = drop.model.unknowns.pull(drop.x)
             for name, blocks in drop.model.unknowns.groups.items():
                 for block in blocks:
                     self.group[place[block]] = name

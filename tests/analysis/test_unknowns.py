@@ -36,7 +36,7 @@ def chain_changed(protocol, name, rod, higher, wider):
 def test_a_row_does_what_another_protocol_does(scene):
     """A rig that is otherwise, described by a protocol, has the path and levels that x has."""
     one, by = case(ALL[scene], seed=2), 1e-4
-    model = one.model()[0]
+    model, _, fall = one.model()
     at, protocol = model.unknowns, one.protocol
     post = protocol.gates.posts[-1]
     rigs = {
@@ -50,11 +50,10 @@ def test_a_row_does_what_another_protocol_does(scene):
         rigs[f"{role} width", 0] = chain_changed(protocol, name, 0, 0.0, by)
         rigs[f"{role} rods", -1] = chain_changed(protocol, name, record.chain.chain.rods - 1, by, 0)
     for (name, member), protocol in rigs.items():
-        x = np.zeros(len(at))
+        x = np.where(at.flat, fall, 0.0)
+        before = x.copy()
         x[range(len(at))[at[name]][member]] = by
-        other = DropModel(
-            protocol, replace(one, protocol=protocol).records, model.guesses, one.scale.u
-        )
+        other = DropModel(protocol, replace(one, protocol=protocol).records, one.scale.u)
         for role in model.records:
             if name in {"impact rods", "impact width", "free rods", "free width"} - {
                 f"{role} rods",
@@ -62,10 +61,8 @@ def test_a_row_does_what_another_protocol_does(scene):
             }:
                 continue  # chains that are like each other are one chain in the protocol
             levels = model.all_levels(role, x)
-            np.testing.assert_allclose(
-                levels, other.all_levels(role, np.zeros(len(at))), rtol=0, atol=1e-12
-            )
+            np.testing.assert_allclose(levels, other.all_levels(role, before), rtol=0, atol=1e-12)
             path = model.trajectory(role, x)
             times = np.linspace(path.time[0], path.time[-1] + 0.1, 50)
-            expected = other.trajectory(role, np.zeros(len(at))).heights(times)[0]
+            expected = other.trajectory(role, before).heights(times)[0]
             np.testing.assert_allclose(path.heights(times)[0], expected, rtol=0, atol=1e-12)
