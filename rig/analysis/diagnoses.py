@@ -26,7 +26,8 @@ STRANGE = 0.5
 too, if more than `FEW` are missing."""
 RIGHT = 0.8
 FEW = 8
-"""Also the number of gates of which any two are tried as exchanged."""
+"""Also the number of gates of which any two are tried as exchanged; half of it in a drop that is
+identified."""
 
 
 class GateCount(NamedTuple):
@@ -67,9 +68,9 @@ class GateCount(NamedTuple):
         return np.unique(self.train.rods[self.match < 0]).size
 
     @property
-    def unseen(self) -> Index:
-        """Rods without a matched edge."""
-        return np.setdiff1d(self.train.rods, self.train.rods[self.match >= 0])
+    def seen(self) -> Index:
+        """Rod of each matched edge."""
+        return self.train.rods[self.match >= 0]
 
     @property
     def is_strange(self) -> bool:
@@ -129,17 +130,17 @@ def gate_reasons(fit: Fit) -> Iterator[Reason]:
 def suspects(records: Collection[ChainRecord], matches: Matches | None = None) -> Suspects:
     """Return the gates that match worst, and the rods that no gate of their chain saw.
 
-    Without matches, only gates are compared.
+    Without matches, only numbers of edges are compared, which tell less.
     """
     counts = gate_counts(records, matches)
-    worst = sorted(counts, key=lambda gate: -gate.missing - gate.surplus)[:FEW]
+    worst = sorted(counts, key=lambda gate: -gate.missing - gate.surplus)
+    worst = worst[: FEW // 2 if matches else FEW]
     absent, more = {}, False
     for record in records if matches else ():
         if gates := [gate for gate in counts if gate.role == record.role]:
-            rods = range(record.chain.chain.rods)
-            absent[record.chain.name] = sorted(
-                set(rods).intersection(*(gate.unseen.tolist() for gate in gates))
-            )
+            due = {rod for gate in gates for rod in gate.train.rods.tolist()}
+            seen = {rod for gate in gates for rod in gate.seen.tolist()}
+            absent[record.chain.name] = sorted(due - seen)
             more |= min(gate.after for gate in gates) >= SIDES
     return Suspects([gate.train.gate for gate in worst], absent, more)
 

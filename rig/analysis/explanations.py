@@ -45,7 +45,7 @@ CLEAR = math.log(100.0)
 """Least log odds of a named fault against every rival and the stated protocol. Also the cost of a
 fault's prior probability: 1 drop in 100 has a given fault."""
 _NAMED = 3  # faults listed if none is clear
-_TRIED = 4  # faults that are fitted: those with the most votes
+_TRIED = 5  # faults that are fitted: those with the largest score, and those with the most votes
 _BEYOND = 10.0  # factor on the prior of the stretch, in a fall that departs from the equations
 
 
@@ -125,16 +125,16 @@ class Explainer:
         """
         if fit is not None and not self._is_odd(fit, reasons):
             return (*reasons,)
-        whole = sorted((cause for cause in self._explain(fit) if cause.whole), key=_evidence)
+        causes = [cause for cause in self._explain(fit) if cause.whole or fit is None]
         # A fault found by score and by votes counts once.
-        ranked = [*{id(cause.fault): cause for cause in whole}.values()]
+        ranked = [*{id(cause.fault): cause for cause in sorted(causes, key=_evidence)}.values()]
         ranked.sort(key=_evidence, reverse=True)
         neither = next(cause.evidence for cause in ranked if cause.fault is _NEITHER)
         if ranked[0].evidence < neither + CLEAR:
             return (*reasons,)
         best, rival, *_ = ranked
         words, lead = self.stated.protocol.vocabulary, best.evidence - rival.evidence
-        if lead > CLEAR:
+        if best.whole and lead > CLEAR:
             why = make_reason(best.fault.code, words, **best.values, log_odds=lead)
         else:
             likely = [cause for cause in ranked if cause.evidence > neither][:_NAMED]
@@ -171,7 +171,9 @@ class Explainer:
             # rod's distance away cannot see that.
             causes += self._by_votes(sized)
         yield from causes
-        if "stretch" in fit.model.unknowns:
+        least = stated.evidence + CLEAR
+        is_clear = any(cause.whole and cause.evidence > least for cause in causes)
+        if is_clear and "stretch" in fit.model.unknowns:
             # The fall may depart from the equations, without a fault.
             scales = self.components
             wider = replace(
