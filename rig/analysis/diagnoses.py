@@ -7,6 +7,7 @@ possible causes.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -135,7 +136,7 @@ def suspects(records: Collection[ChainRecord], matches: Matches | None = None) -
     counts = gate_counts(records, matches)
     worst = sorted(counts, key=lambda gate: -gate.missing - gate.surplus)
     worst = worst[: FEW // 2 if matches else FEW]
-    absent, more = {}, False
+    absent, more = {}, any(_are_crossed(*pair) for pair in combinations(counts, 2))
     for record in records if matches else ():
         if gates := [gate for gate in counts if gate.role == record.role]:
             due = {rod for gate in gates for rod in gate.train.rods.tolist()}
@@ -143,6 +144,13 @@ def suspects(records: Collection[ChainRecord], matches: Matches | None = None) -
             absent[record.chain.name] = sorted(due - seen)
             more |= min(gate.after for gate in gates) >= SIDES
     return Suspects([gate.train.gate for gate in worst], absent, more)
+
+
+def _are_crossed(one: GateCount, other: GateCount) -> bool:
+    """Whether the numbers of edges of two gates rather match each other's expectation."""
+    came, due = (one.train.times.size, other.train.times.size), (one.match.size, other.match.size)
+    own = abs(came[0] - due[0]) + abs(came[1] - due[1])
+    return own - abs(came[0] - due[1]) - abs(came[1] - due[0]) >= 2 * SIDES
 
 
 def _values(protocol: Protocol, train: EdgeTrain) -> dict[str, Any]:

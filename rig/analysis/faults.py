@@ -134,7 +134,8 @@ class Suspects(NamedTuple):
     rods
         Numbers of the rods that no gate saw, by chain; the lowest is 0.
     more
-        Whether all gates of a chain have edges after its last rod.
+        Whether all gates of a chain have edges after its last rod, or two gates have as many edges
+        as the other should.
     """
 
     gates: Sequence[int] = ()
