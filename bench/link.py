@@ -67,7 +67,7 @@ async def watch(path, wanted):
         if count >= wanted:
             done.set()
     client.changed = changed
-    await client.subscribe()
+    await client.call("subscribe")
     print("ready", flush=True)
     await asyncio.wait_for(done.wait(), 60)
     print(json.dumps(seen))

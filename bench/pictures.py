@@ -8,6 +8,7 @@ from dataclasses import replace
 from html import unescape
 from pathlib import Path
 from time import monotonic
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.bench.findings import Findings
@@ -88,10 +89,10 @@ class FakeClient(ReconnectingClient):
         """The one it was given."""
         return self._state
 
-    async def call(self, method: str, **params: Any) -> Any:
+    @property
+    def connection(self) -> Any:
         """Never answer."""
-        del method, params
-        await asyncio.Event().wait()
+        return SimpleNamespace(call=lambda *_, **__: self.keep())
 
     async def keep(self) -> None:
         """Wait to be cancelled."""
@@ -212,9 +213,8 @@ def _falling(state: DaemonState, view: SessionView, job: Job) -> DaemonState:
     until = _LIVE_SHARE * drop.edges[-1].tick
     section = {"run": job.run, "attempt": job.attempt, "state": "fired", "tick_hz": drop.tick_hz}
     edges = tuple([*edge] for edge in drop.edges if edge.tick <= until)
-    return DaemonState(
-        0, {**state.sections, "drop": section, "phase": "recording"}, state.runs, edges
-    )
+    sections = {**state.sections, "drop": section, "phase": "recording"}
+    return replace(state, sections=sections, edges=edges)
 
 
 async def _looks(
@@ -242,11 +242,11 @@ async def _looks(
                 await pilot.pause(0.02)
 
         if shot.state.section("session"):
-            await until(lambda: app.view is not None and app.indicators.known)
+            await until(lambda: app.follower.view is not None and app.follower.indicators.known)
         if shot.page == "history":
             app.desk.players["history"] = Player(0, _REPLAYED_S)
             app.turn("history")
-        await until(lambda: app.page == shot.page and (app.view or app.desk.rows))
+        await until(lambda: app.page == shot.page and (app.follower.view or app.desk.rows))
         # All edges came at once, which looks like flicker for a while.
         await until(lambda: _all_counted(app, shot) and _quiet(app))
         for size in sizes:
@@ -262,12 +262,14 @@ def _as_svg(app: RigApp) -> str:
 
 
 def _all_counted(app: RigApp, shot: Screenshot) -> bool:
-    return len(shot.state.edges) <= sum(gate.edges for gate in app.indicators.gates)
+    return len(shot.state.edges) <= sum(gate.edges for gate in app.follower.indicators.gates)
 
 
 def _quiet(app: RigApp) -> bool:
     now = monotonic()
-    return all(gate.steady(now) and not gate.flickers(now) for gate in app.indicators.gates)
+    return all(
+        gate.steady(now) and not gate.flickers(now) for gate in app.follower.indicators.gates
+    )
 
 
 async def at_rest(app: RigApp, pilot: Pilot[None], look: Callable[[], str]) -> str:

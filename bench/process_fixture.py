@@ -156,8 +156,8 @@ class ProcessFixture:
                         stream.close()
 
     def fill_disk(self) -> None:
-        """Let no file of the session grow, as on a full disk."""
-        self._limit_files(max(file.stat().st_size for file in self.folder.glob("session*")))
+        """Let what is written of the session grow no further, as on a full disk."""
+        self._limit_files(max(file.stat().st_size for file in self.folder.glob("session-*")))
 
     def free_disk(self) -> None:
         """Make room again."""

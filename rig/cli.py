@@ -84,7 +84,7 @@ def _carry_out(words: list[str], struck: list[object]) -> int:
     if "place" not in arguments:
         say(first_help(), end="")
         return BAD_INPUT
-    from rig.ctrl_c import ctrl_c_goes_to  # noqa: PLC0415 - `rig --help` needs none of it
+    from rig.ctrl_c import signals_go_to  # noqa: PLC0415 - `rig --help` needs none of it
 
     def strike(number: int, frame: FrameType | None) -> None:
         struck.append(frame)
@@ -92,7 +92,7 @@ def _carry_out(words: list[str], struck: list[object]) -> int:
 
     module, _, function = arguments.place.partition(".")
     command = getattr(import_module(f"rig.commands.{module}"), function)
-    with ctrl_c_goes_to(strike):
+    with signals_go_to(strike, signal.SIGINT):
         code: int = command(arguments) or 0
         sys.stdout.flush()
     return code

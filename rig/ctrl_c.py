@@ -1,4 +1,4 @@
-"""Ctrl-C that waits where an exception would do harm."""
+"""Signals that somebody else obeys, and Ctrl-C that waits where an exception would do harm."""
 
 from __future__ import annotations
 
@@ -10,30 +10,37 @@ from types import FrameType
 
 
 @contextmanager
-def ctrl_c_goes_to(handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
-    """Have Ctrl-C handled so in a block, where this thread has it and nobody ignores it."""
-    before = signal.getsignal(signal.SIGINT)
-    if not callable(before) or threading.current_thread() is not threading.main_thread():
-        yield
-        return
+def signals_go_to(
+    handler: Callable[[int, FrameType | None], object], *numbers: signal.Signals
+) -> Iterator[None]:
+    """Have signals handled so in a block, in the main thread, but for those that are ignored.
+
+    A shell starts what runs in the background with Ctrl-C ignored, and means it.
+    """
+    before = {
+        number: signal.signal(number, handler)
+        for number in numbers
+        if signal.getsignal(number) not in {signal.SIG_IGN, None}
+    }
     try:
-        signal.signal(signal.SIGINT, handler)
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
 
 
 @contextmanager
 def ctrl_c_waits() -> Iterator[None]:
-    """Keep Ctrl-C waiting until the end of a block.
+    """Keep Ctrl-C, where this thread has it, waiting until the end of a block.
 
     An exception that strikes where a library calls back from C++ ends the process, and in the
     callback of a weak reference it is shown and lost.
     """
-    before, came = signal.getsignal(signal.SIGINT), list["FrameType | None"]()
+    came: list[int] = []
+    is_ours = threading.current_thread() is threading.main_thread()
     try:
-        with ctrl_c_goes_to(lambda _number, frame: came.append(frame)):
+        with signals_go_to(lambda number, _: came.append(number), *[signal.SIGINT] * is_ours):
             yield
     finally:
-        if came and callable(before):
-            before(signal.SIGINT, came[0])
+        for number in came[:1]:
+            signal.raise_signal(number)

@@ -13,8 +13,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple, Self
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,8 +34,8 @@ from rig.reasons import rig_error
 from rig.report.numbers import ranges, with_unit
 from rig.report.parts import means_parts, summary_table
 from rig.report.templates import parts_html
-from rig.results import SessionResults, calibration, protocol_of, results
 from rig.results.together import MeanDifference, TogetherResults, results_together
+from rig.results.whole import SessionResults, calibration, protocol_of, results
 from rig.session.store import Session
 
 __all__ = [
@@ -108,7 +109,7 @@ class Edges(NamedTuple):
     blocked: NDArray[np.bool_]
 
 
-class RecordedSession:
+class RecordedSession(AbstractContextManager["RecordedSession"]):
     """A session, open for reading; also a context manager."""
 
     def __init__(self, file: Session) -> None:
@@ -148,8 +149,6 @@ class RecordedSession:
         SessionError
             If its stored record is damaged.
         """
-        import numpy as np  # noqa: PLC0415 - a door costs nothing before it is used
-
         recorded = [*self._file.drops()]
         drops = [drop for drop in recorded if drop.run == run and attempt in {None, drop.attempt}]
         if not drops:
@@ -168,9 +167,6 @@ class RecordedSession:
     def __add__(self, other: RecordedSession) -> RecordedSessions:
         """Return both sessions as one."""
         return RecordedSessions((self, other))
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

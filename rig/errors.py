@@ -46,7 +46,7 @@ class RigError(Exception):
     Attributes
     ----------
     reasons
-        The `rig.reasons.Reason` of it, where it has a code: see `rig.reasons.make_error`.
+        The `rig.reasons.Reason` of it, where it has a code: see `rig.reasons.rig_error`.
     """
 
     exit_code = 1
@@ -83,6 +83,30 @@ class DeviceError(RigError):
 
 class DeviceTimeoutError(DeviceError, TimeoutError):
     """The device did not answer in time."""
+
+
+class StoppedError(DeviceError):
+    """A client pressed STOP, or the one in control was lost."""
+
+
+class ControlError(DeviceError):
+    """Another client holds what this one asked for."""
+
+
+class BusyError(DeviceError):
+    """So many clients are there, or so many requests wait, that no more is taken."""
+
+
+class VersionError(RigError):
+    """Client and daemon do not speak the same interface."""
+
+    exit_code = 4
+
+
+class ClusterError(RigError):
+    """A cluster cannot be reached, is not fit or breaks off, exit code 4."""
+
+    exit_code = 4
 
 
 class SessionError(RigError, OSError):

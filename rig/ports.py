@@ -97,11 +97,6 @@ def told(url: str) -> str:
     return _with_settings(url, {n: text for n, text in _settings(url).items() if n not in _FILES})
 
 
-def simulation_package() -> str:
-    """Name the package of the simulation: an installed one must not take the name ``sim``."""
-    return "rig_sim" if (Path(__file__).parents[1] / "rig_sim").is_dir() else "sim"
-
-
 def truth_file(session: Path) -> Path:
     """Where a simulation keeps the truth of a session."""
     return Path(f"{session}.truth.jsonl")  # with_name would not take a folder's root

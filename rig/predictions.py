@@ -16,6 +16,7 @@ from rig.units import Quantity
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from rig.measurands import Measurand
     from rig.model.chain import Chain
     from rig.model.surface import Surface
     from rig.protocol.protocol import Protocol, RodChain, Run
@@ -75,6 +76,11 @@ def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
         return {row.name: protocol.gravity}
     model = predict_incline(protocol, run.incline_deg, run.impact)
     rows = (SEPARATION, SPEED, FALL_TIME) if run.free is not None else (SPEED, FALL_TIME)
+    return quantities(model, *rows)
+
+
+def quantities(model: PredictedIncline, *rows: Measurand) -> dict[str, Quantity]:
+    """Return what a prediction says of some measurands, by JSON name, where it has an answer."""
     return {
         row.name: Quantity(value, getattr(model, row.key("u")) or 0.0)
         for row in rows

@@ -7,9 +7,6 @@ from pathlib import Path
 
 from rig.errors import InputError
 
-WIRED = {"pico": "rp2040", "mega": "atmega2560", "uno": "atmega328p"}
-"""Boards of whose circuits there is a picture, and its folder in `firmware`."""
-
 
 def ready_protocols() -> dict[str, Path]:
     """Return the ready protocols by their names, which have no ending."""
@@ -40,17 +37,6 @@ def find_protocol(name: str) -> str:
     """
     places = (name, f"{name}.yaml", str(ready_protocols().get(name, "")))
     return next(filter(os.path.isfile, places), name)
-
-
-def wiring_picture(board: str) -> Path:
-    """Find the circuits around a board (SVG), by the word for it at the command line.
-
-    Raises
-    ------
-    InputError
-        Where this installation lacks it.
-    """
-    return find_resource(f"firmware/{WIRED[board]}/wiring.svg")
 
 
 def find_resource(name: str) -> Path:

@@ -94,29 +94,16 @@ def make_reason(code: str, words: Vocabulary = ANY_SCENE, /, **values: Any) -> R
     return Reason(code, values, sentence, words.scene)
 
 
-def make_error(kind: type[Failure], code: str, /, **values: Any) -> Failure:
-    """Make the error that refuses a request; its message and its hint are the table's.
+def rig_error(code: str, /, **values: Any) -> RigError:
+    """Make the error that refuses a request; its class, message and hint are the table's.
 
     Parameters
     ----------
-    kind
-        Class of the error.
     code, **values
         As for `make_reason`; of a path its name is kept, of an exception its words.
     """
     words = {name: _plain_value(value) for name, value in values.items()}
-    return error_of(kind, make_reason(code, **words))
-
-
-def rig_error(code: str, /, **values: Any) -> RigError:
-    """Make the error that refuses a request for a code, of the kind that the table says.
-
-    Parameters
-    ----------
-    code, **values
-        As for `make_error`.
-    """
-    return make_error(WORDINGS[code].error, code, **values)
+    return error_of(WORDINGS[code].error, make_reason(code, **words))
 
 
 def _plain_value(value: object) -> object:

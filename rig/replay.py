@@ -9,7 +9,7 @@ from typing import Any
 
 from rig.analysis.session import Progress
 from rig.records import ClockSample, Drop, Pulse
-from rig.results import results
+from rig.results.whole import results
 from rig.session.drop_check import ByteReplay, as_old_as
 from rig.session.reading import Reader
 

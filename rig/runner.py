@@ -11,7 +11,7 @@ from typing import NamedTuple
 from rig.analysis.result import DropResult
 from rig.campaign import machine
 from rig.campaign.machine import Effect, Event, Flow, Stage, step
-from rig.campaign.plan import describe_setup, job_to_judge, next_job, plan_lines, rest_s
+from rig.campaign.plan import describe_setup, job_to_judge, next_job, rest_s
 from rig.campaign.voids import voids_of
 from rig.daemon.client import Client
 from rig.daemon.connecting import connect
@@ -22,10 +22,11 @@ from rig.protocol.measurable import check_gates, check_recordable
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
 from rig.recorder.interrupts import Interrupts
-from rig.records import Drop, Job
+from rig.recorder.run_lines import plan_lines
+from rig.records import Job
 from rig.report.templates import sentence
-from rig.results import SessionResults, results
 from rig.results.live import LiveAnalysis
+from rig.results.whole import SessionResults, results
 from rig.session.schema import RunState
 from rig.session.store import Session
 
@@ -128,7 +129,6 @@ class Campaign:
         self.flow = Flow(Stage.DEVICE, countdown_s=0.0, attended=attended, row=row)
         self.live = LiveAnalysis(self.session.path)
         self._clock_u: float | None = None
-        self._drop: Drop | None = None  # collected last
         self._result: DropResult | None = None  # of the drop judged last
         self._failed: DeviceRefusedError | None = None
 
@@ -213,7 +213,7 @@ class Campaign:
                 case machine.FireRelease(armed):
                     self.rig.fire(armed)
                 case machine.Collect(job):
-                    self._drop = self.rig.collect(*job)
+                    self.rig.collect(*job)
                 case machine.Judge(job):
                     return self._judge(job)
                 case machine.Log(job, state, reasons):
@@ -232,10 +232,9 @@ class Campaign:
         return machine.EffectDone(self.flow.ticket, token)
 
     def _judge(self, job: Job) -> Event:
-        if self._drop is None or job != self._drop.job:
-            self._drop = self.rig.collect(*job)
+        drop = self.rig.collect(*job)  # as it is in the session
         with self.interrupts.let_through():
-            result = self._result = self.live.judge(self.session, self._drop)
+            result = self._result = self.live.judge(self.session, drop)
         return machine.DropVerdict(self.flow.ticket, result.verdict, result.reasons)
 
     def _stop(self, why: str) -> None:

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
-from functools import cache, wraps
-from typing import Any, ParamSpec, TypeVar
-
-P = ParamSpec("P")
-T = TypeVar("T")
+from contextlib import ContextDecorator
+from functools import cache
+from typing import Any
 
 
-class _Bound:
+class _OneThread(ContextDecorator):
     """Holds until nobody works within it any more, in whatever thread.
 
     How many threads multiply is one number for the whole process in most builds of BLAS: whoever
@@ -40,23 +37,13 @@ class _Bound:
                 _disown()
 
 
-_BOUND = _Bound()
+one_thread = _OneThread()
+"""Has a function's matrices multiplied by one thread, whoever calls it.
 
-
-def one_thread(work: Callable[P, T]) -> Callable[P, T]:
-    """Have a function's matrices multiplied by one thread, whoever calls it.
-
-    With several, a sum's last digits depend on how busy the machine is, and on two cores the same
-    work costs twice the processor time. Others' matrices are theirs: the bound ends with the last
-    of all calls that are under way, in whatever threads.
-    """
-
-    @wraps(work)
-    def run_bounded(*args: P.args, **kwargs: P.kwargs) -> T:
-        with _BOUND:
-            return work(*args, **kwargs)
-
-    return run_bounded
+With several, a sum's last digits depend on how busy the machine is, and on two cores the same work
+costs twice the processor time. Others' matrices are theirs: the bound ends with the last of all
+calls that are under way, in whatever threads.
+"""
 
 
 @cache

@@ -15,6 +15,8 @@ from fractions import Fraction
 
 from rig.text_rows import read_rows
 
+_COVERAGE_95 = 1.959963984540054  # of a normal distribution, as in rig.analysis.distributions
+
 
 @dataclass(frozen=True, slots=True)
 class Quantity:
@@ -32,6 +34,11 @@ class Quantity:
 
     value: float
     u: float = 0.0
+
+    @property
+    def expanded(self) -> float | None:
+        """Expanded uncertainty for 95 % coverage; `None` where the value is exact."""
+        return _COVERAGE_95 * self.u or None
 
 
 class UnitError(ValueError):

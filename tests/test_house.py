@@ -4,6 +4,7 @@ import ast
 import math
 import re
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -16,6 +17,7 @@ UNCOUNTED = (ast.expr_context, ast.operator, ast.unaryop, ast.boolop, ast.cmpop)
 TOPS = ("rig", "sim", "bench", "firmware", "tests")
 
 
+@cache
 def rooms() -> dict[tuple[str, ...], tuple[int, int]]:
     """Return what each room may have now and what it is to have, by the paths that make it."""
     page = re.sub(r"(?<=\d),(?=\d)", "", PAGE)
@@ -23,20 +25,6 @@ def rooms() -> dict[tuple[str, ...], tuple[int, int]]:
     return {
         tuple(re.findall(r"`(.+?)`", paths)): (int(now), int(goal)) for paths, now, goal in rows
     }
-
-
-def nodes(statement: ast.stmt) -> int:
-    """Count a statement's own nodes: those of statements inside it are theirs."""
-    count, rest = 0, [statement]
-    while rest:
-        node = rest.pop()
-        count += 1
-        rest += [
-            child
-            for child in ast.iter_child_nodes(node)
-            if not isinstance(child, (ast.stmt, *UNCOUNTED))
-        ]
-    return count
 
 
 def is_docstring(node: ast.AST) -> bool:
@@ -48,11 +36,18 @@ def is_docstring(node: ast.AST) -> bool:
 
 
 def code_lines(text: str) -> int:
-    return sum(
-        math.ceil(nodes(node) / NODES_A_LINE)
-        for node in ast.walk(ast.parse(text))
-        if isinstance(node, ast.stmt) and not is_docstring(node)
-    )
+    """Count lines by each statement's own nodes: those of statements inside it are theirs."""
+    own: Counter[ast.AST] = Counter()
+    rest = [(node, node) for node in ast.parse(text).body]
+    while rest:
+        node, statement = rest.pop()
+        own[statement] += 1
+        rest += [
+            (child, child if isinstance(child, ast.stmt) else statement)
+            for child in ast.iter_child_nodes(node)
+            if not isinstance(child, UNCOUNTED)
+        ]
+    return sum(math.ceil(own[one] / NODES_A_LINE) for one in own if not is_docstring(one))
 
 
 def room_of(path: str) -> tuple[str, ...]:

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from rig.cli import OPTIONAL
-from rig.ready import WIRED, ready_protocol, wiring_picture
+from rig.flash.boards import TARGETS
+from rig.ready import ready_protocol
 from tests.programs import run_program
 
 ROOT = Path(__file__).parents[1]
@@ -98,7 +99,10 @@ def test_a_wheel_has_the_files_that_commands_look_for():
     hatch = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["hatch"]
     shipped = hatch["build"]["targets"]["wheel"]["force-include"]
     assert all((ROOT / source).exists() for source in shipped)
-    looked_for = [ready_protocol("inclined-uniform"), *map(wiring_picture, WIRED)]
+    looked_for = [
+        ready_protocol("inclined-uniform"),
+        *(board.wiring_path for board in TARGETS.values()),
+    ]
     for path in (one.relative_to(ROOT) for one in looked_for):
         source = next(one for one in (path, *path.parents) if str(one) in shipped)
         assert shipped[str(source)] == f"rig/{source}"

@@ -28,8 +28,7 @@ from bench.studies.sessions import SimulatedSession, without_device
 from bench.workers import results
 from rig.analysis.comparison import compare
 from rig.analysis.gravity import check_gravity
-from rig.analysis.result import Measured
-from rig.analysis.summary import good_cases
+from rig.analysis.result import Measured, good_runs
 from rig.bench.findings import Findings
 from rig.commands.output import progress, say
 from rig.errors import InputError
@@ -363,7 +362,7 @@ def _compare(rig: Rig, session: SimulatedSession) -> RigResult:
             if each.identified:
                 together.add_error(each.name, each.least_squares, each.stated.value, number)
     if not rig.dials:
-        for comparison in compare(protocol, good_cases(protocol, analysis.runs)):
+        for comparison in compare(protocol, good_runs(analysis.runs)):
             errors = [abs(line.normalized_error or 0.0) for line in comparison.differences]
             outcome.agreement[comparison.quantity] = comparison.p, errors
     return outcome

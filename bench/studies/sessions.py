@@ -14,7 +14,7 @@ from bench.studies.time_scales import time_scale
 from rig.analysis.session import analyze
 from rig.errors import InputError
 from rig.ports import is_simulated, truth_file
-from rig.results import calibration, complete_analysis, protocol_of
+from rig.results.whole import calibration, complete_analysis, protocol_of
 from rig.runner import Operator, run_protocol
 from rig.session.store import Session
 

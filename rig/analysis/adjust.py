@@ -151,12 +151,16 @@ def least_squares(
         Finite estimates; not `settled` if the fit did not converge.
     """
     prior = np.zeros_like(x) if centre is None else standardise(centre, sd)
-    search = _Search(linearize, sd, prior, scatter)
-    point = search.look(standardise(x, sd))
+
+    def look(y: Array, inflation: float) -> _Point:
+        pull = np.where(np.isnan(prior), 0.0, y - prior)
+        return _Point(y, inflation, linearize(y * sd, inflation), sd, pull)
+
+    point = look(standardise(x, sd), scatter)
     if not math.isfinite(point.loss):
         return Estimate(x, sd, np.eye(x.size), math.inf, 0, 1.0, settled=False)
     damping, previous, step = 0.0, 0.0, np.zeros_like(x)
-    settled, shorts = False, 0
+    inflation, settled, shorts = scatter, False, 0
     for _ in range(steps):
         step = point.root.damp(damping).step() if damping else point.root.step()
         moved = length(step, point.root.matrix)
@@ -166,14 +170,15 @@ def least_squares(
         last = point.size < done or shorts > PATIENT
         short = near and (last or (not damping and moved**2 < done * previous))
         if short or (near and not rough):
-            factor = search.scatter(point)
-            if short and (rough or factor == 1.0):
-                search.inflation, settled = search.inflation * factor, True
+            factor = point.excess()
+            inflation = point.inflation * factor
+            settled = short and (rough or factor == 1.0)
+            if settled:
                 break
             if factor != 1.0:
-                point, previous = search.weigh(point, factor), 0.0
+                point, previous = look(point.y, inflation), 0.0
                 continue
-        ahead = search.look(point.y + step)
+        ahead = look(point.y + step, point.inflation)
         if not ahead.loss <= point.loss - _GAIN * point.predicted_reduction(step):
             damping = damping * _FASTER or _DAMPED
             continue
@@ -181,16 +186,15 @@ def least_squares(
         point, previous = ahead, moved
         damping = damping / _SLOWER if damping > _FAINT else 0.0
     step = step if settled else np.zeros_like(x)
-    rows = {role: rows.after(step * sd) for role, rows in point.seen.rows.items()}
     return Estimate(
         (point.y + step) * sd,
         sd,
         point.root.matrix,
         point.seen.chi2,
         point.seen.size,
-        search.inflation,
+        inflation,
         settled,
-        rows,
+        {role: rows.after(step * sd) for role, rows in point.seen.rows.items()},
     )
 
 
@@ -200,13 +204,16 @@ class _Point:
 
     Attributes
     ----------
-    y, seen
-        Unknowns in units of their prior uncertainties, and the linearization there.
+    y
+        Unknowns in units of their prior uncertainties.
+    inflation, seen
+        Scatter of the observations relative to the assumed scatter, and the linearization with it.
     sd, pull
         Prior uncertainties, and deviations of the unknowns from the prior means in these units.
     """
 
     y: Array
+    inflation: float
     seen: Linearization
     sd: Array
     pull: Array
@@ -218,7 +225,7 @@ class _Point:
 
     @property
     def usual(self) -> float:
-        """Scatter of the observations relative to the assumed scatter; at least 1."""
+        """Scatter of the observations relative to the present assumption; at least 1."""
         return math.sqrt(max(1.0, self.seen.chi2 / max(1, self.seen.size)))
 
     @cached_property
@@ -236,53 +243,19 @@ class _Point:
         remainder = self.root.left + self.root.matrix @ step
         return float(self.root.left @ self.root.left - remainder @ remainder)
 
-
-class _Search:
-    """Observations and priors of a fit, and its steps.
-
-    Parameters
-    ----------
-    linearize, sd
-        As in `least_squares`.
-    prior
-        Prior means of the unknowns, in units of `sd`.
-    inflation
-        Scatter of the observations relative to the assumed scatter.
-    """
-
-    def __init__(
-        self,
-        linearize: Callable[[Array, float], Linearization],
-        sd: Array,
-        prior: Array,
-        inflation: float,
-    ) -> None:
-        self._linearize, self._sd, self._prior = linearize, sd, prior
-        self.inflation = inflation
-
-    def look(self, y: Array) -> _Point:
-        """Return the point `y` with its linearization."""
-        pull = np.where(np.isnan(self._prior), 0.0, y - self._prior)
-        return _Point(y, self._linearize(y * self._sd, self.inflation), self._sd, pull)
-
-    def scatter(self, point: _Point) -> float:
+    def excess(self) -> float:
         """Return the scatter relative to the present assumption; 1 if it is close enough.
 
-        The total never falls below the stated scatter.
+        The total never falls below the assumed scatter.
         """
-        seen = point.seen
+        seen = self.seen
         # The scatter would be at most this if every unknown used a whole degree of freedom.
-        if self.inflation == 1.0 and seen.chi2 < _MORE**2 * (seen.size - point.y.size):
+        if self.inflation == 1.0 and seen.chi2 < _MORE**2 * (seen.size - self.y.size):
             return 1.0
-        inverse = np.linalg.inv(point.root.matrix)
+        inverse = np.linalg.inv(self.root.matrix)
         degrees = max(1.0, seen.size - len(inverse) + float(np.sum(inverse**2)))
         factor = max(math.sqrt(seen.chi2 / degrees), 1.0 / self.inflation)
         return 1.0 if 1.0 / _MORE < factor < _MORE else factor
-
-    def weigh(self, point: _Point, factor: float) -> _Point:
-        """Return the point linearized anew with the scatter multiplied by `factor`."""
-        self.inflation *= factor
-        return self.look(point.y)
 
 
 def length(step: Array, root: Array) -> float:

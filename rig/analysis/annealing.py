@@ -17,10 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.analysis.air import prior_air
 from rig.analysis.chain_records import WIDER, ChainRecord, EdgeTrain
 from rig.analysis.components import Components
-from rig.analysis.discrepancy import LOWEST_START
+from rig.analysis.departures import LOWEST_START
 from rig.analysis.free_flight import FAINT
 from rig.analysis.trajectory import (
     COMMON,
@@ -30,7 +29,7 @@ from rig.analysis.trajectory import (
     free_trajectory,
     struck_trajectory,
 )
-from rig.analysis.unknowns import ANY_GRAVITY
+from rig.analysis.unknowns import ANY_GRAVITY, prior_air
 from rig.arrays import Array, Index
 from rig.protocol.protocol import Protocol
 

@@ -8,13 +8,28 @@ averaging does not reduce it. For runs of a joint fit the common part has a sign
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
+from operator import attrgetter
+from typing import TypeVar
 
 import numpy as np
 
-from rig.analysis.quantities import COMMON
+from rig.analysis.budget_lines import COMMON
 from rig.analysis.result import Measured
+from rig.protocol.protocol import Condition, Protocol, Run
+
+T = TypeVar("T")
+
+
+def by_case(
+    protocol: Protocol, members: Iterable[T], run_of: Callable[[T], Run] = attrgetter("run")
+) -> dict[Condition, list[T]]:
+    """Group members by incline and, if chains differ, by striking chain, in order."""
+    groups: dict[Condition, list[T]] = {}
+    for member in members:
+        groups.setdefault(protocol.condition(run_of(member)), []).append(member)
+    return dict(sorted(groups.items()))
 
 
 def mean(runs: Sequence[Measured]) -> Measured:

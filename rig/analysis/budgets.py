@@ -21,13 +21,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rig.analysis.budget_lines import BUDGET, COMMON, effective_degrees
 from rig.analysis.distributions import COVERAGE_95, coverage_factor
 from rig.analysis.drop_model import DropModel
 from rig.analysis.dual import Dual
 from rig.analysis.gate_passages import GatePassage, gate_passages
 from rig.analysis.joint_fit import JointFit
 from rig.analysis.joint_step import JointDrop
-from rig.analysis.quantities import BUDGET, COMMON, AdjustedDrop, effective_degrees, measurands
+from rig.analysis.quantities import measurands
 from rig.analysis.result import Deviation, Measured
 from rig.analysis.unknowns import Side
 from rig.arrays import Array, Flags, Index
@@ -81,8 +82,7 @@ class Budgets:
 
     def gates(self, drop: JointDrop) -> tuple[GatePassage, ...]:
         """Return the passages of a single object through each gate."""
-        adjusted = AdjustedDrop(drop.model, drop.x)
-        return gate_passages(drop, adjusted, lambda value: self._measure(drop, [value])[0])
+        return gate_passages(drop, lambda value: self._measure(drop, [value])[0])
 
     def roots(self, drop: JointDrop, slopes: Array) -> tuple[Array, Array, Array]:
         """Return vectors whose squared lengths add up to the variance of functions of a drop.

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rig.analysis.air import unlike
 from rig.analysis.trajectory import ONE
 from rig.arrays import Array, Flags, Index
 from rig.errors import DomainError
+from rig.model.chain import Chain
 from rig.model.fall import kicks
 from rig.model.impact import impact_on
 from rig.predictions import air_shares
@@ -158,7 +158,7 @@ class ChainRecord:
         κ of each leg in units of that of the first chain as a whole, as in
         `rig.analysis.trajectory.Trajectory`.
     unlike
-        κ of each rod alone less that of its chain, see `rig.analysis.air.unlike`.
+        κ of each rod alone less that of its chain, see `unlike`.
     uneven
         Scatter of its single impulses relative to that on a bare board.
     incline_deg
@@ -282,6 +282,25 @@ def thin(drop: Drop, hz: float) -> Drop:
     """Return a drop without the middles of long flickers, for repeated analysis."""
     numbers = np.sort(EdgeArrays.of(drop.edges, hz).numbers)
     return replace(drop, edges=tuple(drop.edges[n] for n in numbers.tolist()))
+
+
+def unlike(chain: Chain, shares: Sequence[float]) -> Array:
+    """Return κ of each rod alone less that of its chain, in units of κ.
+
+    Parameters
+    ----------
+    shares
+        κ of each rod together with all above it, in the same units.
+
+    Returns
+    -------
+    ndarray
+        Shape ``(rods,)``, or a single zero if all rods are alike.
+    """
+    masses = np.array(chain.masses)
+    force = np.array(shares) * np.cumsum(masses[::-1])[::-1]
+    more: Array = -np.diff(force, append=0.0) / masses - shares[0]
+    return more if np.ptp(shares) else np.zeros(1)
 
 
 def chain_records(

@@ -8,20 +8,23 @@ the mean of n falls is divided by √n.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import compress
 from statistics import fmean
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from rig.analysis.averages import by_case
 from rig.analysis.distributions import chi2_tail, coverage_factor
-from rig.analysis.plain_data import attributes, plain
+from rig.analysis.plain_data import Record
 from rig.analysis.result import Deviation, DropResult, Measured
 from rig.arrays import Array
 from rig.measurands import averaged
 from rig.predictions import coefficient_slopes, predicted_run
 from rig.protocol.protocol import GUESSED, Condition, Protocol
+from rig.units import Quantity
 
 _ROUNDING = 1e-12
 
@@ -38,6 +41,8 @@ class Difference(Measured):
         Drops in the mean.
     """
 
+    MEMBERS = "*condition difference=value n u normalized_error chi2 p"
+
     condition: Condition
     n: int
 
@@ -51,14 +56,9 @@ class Difference(Measured):
         """Probability of a χ² at least as large by chance."""
         return chi2_tail(self.chi2, 1)
 
-    def json(self) -> dict[str, Any]:
-        """Return a member of ``inclines``."""
-        names = ("n", "u", "normalized_error", "chi2", "p")
-        return {**self.condition.json(), "difference": self.value, **attributes(self, *names)}
-
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
+class Comparison(Record):
     """Comparison of a measurand with the model.
 
     Attributes
@@ -68,6 +68,8 @@ class Comparison:
     chi2
         χ² of all conditions together, with their covariance.
     """
+
+    MEMBERS = "quantity chi2 degrees p inclines=differences"
 
     quantity: str
     chi2: float
@@ -83,77 +85,70 @@ class Comparison:
         """Probability of a χ² at least as large by chance."""
         return chi2_tail(self.chi2, self.degrees)
 
-    def json(self) -> dict[str, Any]:
-        """Return a member of ``comparison``."""
-        fields = attributes(self, "quantity", "chi2", "degrees", "p")
-        return fields | {"inclines": plain(self.differences)}
 
-
-def compare(protocol: Protocol, cases: Sequence[Sequence[DropResult]]) -> tuple[Comparison, ...]:
+def compare(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Comparison, ...]:
     """Compare means with the protocol's model, all conditions at once.
 
     Means of different conditions share the rig's errors, and predictions share the model's
     coefficients. The covariance of χ² includes both, so that a wrong β counts once and not nine
     times. Conditions outside the model's domain are left out.
 
-    Parameters
-    ----------
-    cases
-        Drops of each condition, see `rig.analysis.summary.by_case`.
-
     Returns
     -------
     tuple of Comparison
         A comparison for each measurand with a prediction, unless the difference is exact.
     """
-    models = [predicted_run(protocol, runs[0].run) for runs in cases]
-    slopes = [coefficient_slopes(protocol, runs[0].run) for runs in cases]
+    cases = by_case(protocol, results)
+    models = [
+        (predicted_run(protocol, run), coefficient_slopes(protocol, run))
+        for run in (runs[0].run for runs in cases.values())
+    ]
     comparisons = []
     for name in (row.name for row in averaged()):
         lines = [
-            _Line(
-                protocol.condition(runs[0].run),
-                np.array([run.quantities[name].value - model[name].value for run in runs]),
-                [_deviation(run.quantities[name]) for run in runs],
-                runs[0].quantities[name].u,
-                slope.get(name, {}),
-            )
-            for runs, model, slope in zip(cases, models, slopes, strict=True)
+            _Line(at, [run.quantities[name] for run in runs], model[name], slopes.get(name, {}))
+            for (at, runs), (model, slopes) in zip(cases.items(), models, strict=True)
             if name in model and all(name in run.quantities for run in runs)
         ]
         comparisons += [_compare(name, lines)] if lines else []
     return tuple(comparison for comparison in comparisons if comparison.differences)
 
 
-def _deviation(measured: Measured) -> Deviation:
-    """Return the deviation of a value; without a fit, its uncertainty counts as its own."""
-    return measured.deviation or Deviation(measured.u**2, measured.degrees, (0.0,), (0.0,))
-
-
 class _Line(NamedTuple):
-    """Values less their prediction under a condition, and its derivatives by the coefficients."""
+    """Values under a condition, their prediction, and its derivatives by the coefficients."""
 
     condition: Condition
-    off: Array
-    deviations: Sequence[Deviation]
-    u: float
+    values: Sequence[Measured]
+    predicted: Quantity
     slopes: Mapping[str, float]
+
+    @property
+    def off(self) -> Array:
+        """Each value less the prediction."""
+        return np.array([measured.value - self.predicted.value for measured in self.values])
+
+    @property
+    def deviations(self) -> list[Deviation]:
+        """Deviation of each value; without a fit, its uncertainty counts as its own."""
+        return [
+            measured.deviation or Deviation(measured.u**2, measured.degrees, (0.0,), (0.0,))
+            for measured in self.values
+        ]
 
 
 def _compare(name: str, lines: Sequence[_Line]) -> Comparison:
     names = {key: None for line in lines for key in line.slopes}
     slopes = np.array([[line.slopes.get(key, 0.0) for key in names] for line in lines])
-    size = np.sum(slopes**2, axis=1) + [line.u**2 for line in lines]
+    size = np.sum(slopes**2, axis=1) + [line.values[0].u ** 2 for line in lines]
     covariance = _covariance(lines) + slopes @ slopes.T
-    places = np.flatnonzero(covariance.diagonal() > _ROUNDING * size)
-    covariance = covariance[np.ix_(places, places)]
-    lines = [lines[place] for place in places.tolist()]
-    off = np.array([float(line.off.mean()) for line in lines])
-    differences = [
-        Difference(value, math.sqrt(u2), condition=line.condition, n=line.off.size)
-        for line, value, u2 in zip(lines, off.tolist(), covariance.diagonal().tolist(), strict=True)
-    ]
-    return Comparison(name, float(off @ np.linalg.solve(covariance, off)), tuple(differences))
+    inexact = covariance.diagonal() > _ROUNDING * size
+    covariance, lines = covariance[np.ix_(inexact, inexact)], [*compress(lines, inexact)]
+    differences = tuple(
+        Difference(float(line.off.mean()), u, condition=line.condition, n=len(line.values))
+        for line, u in zip(lines, np.sqrt(covariance.diagonal()).tolist(), strict=True)
+    )
+    off = np.array([difference.value for difference in differences])
+    return Comparison(name, float(off @ np.linalg.solve(covariance, off)), differences)
 
 
 def _covariance(lines: Sequence[_Line]) -> Array:

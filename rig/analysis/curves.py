@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any
-
-import numpy as np
 
 from rig.analysis.distributions import coverage_factor
 from rig.measurands import SEPARATION, SPEED
@@ -16,6 +15,7 @@ _BEYOND = 5.0  # degrees by which curves extend beyond the outermost inclines
 _STEEPEST = 89.0
 
 
+@lru_cache(maxsize=4)
 def model_curves(protocol: Protocol) -> dict[str, Any]:
     """Predict Δz and V with their bands for every degree; empty without a surface.
 
@@ -28,12 +28,11 @@ def model_curves(protocol: Protocol) -> dict[str, Any]:
     if surface is None:
         return {}
     inclines = protocol.plan.inclines
-    low = max(0.0, min(inclines) - _BEYOND)
-    high = min(_STEEPEST, max(inclines) + _BEYOND)
-    points = set(np.arange(low, high + 0.5, 1.0).tolist())
+    low, high = max(0.0, min(inclines) - _BEYOND), min(_STEEPEST, max(inclines) + _BEYOND)
+    points = {low + degrees for degrees in range(math.ceil(high + 0.5 - low))}
     if surface.pile is not None and low < surface.pile.below_deg <= high:
         edge = surface.pile.below_deg
-        points |= {edge, float(np.nextafter(edge, 0.0))}
+        points |= {edge, math.nextafter(edge, 0.0)}
     predictions = [
         (struck, predict_incline(protocol, incline, struck))
         for struck in protocol.strikers

@@ -12,11 +12,10 @@ from typing import Any
 import numpy as np
 
 from rig.analysis import annealing
-from rig.analysis.air import prior_air
 from rig.analysis.annealing import PART, Pairing, SideFall, matched
 from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import SHARPEST, Components, priors
-from rig.analysis.discrepancy import LOWEST_START, STRETCHES, Discrepancy
+from rig.analysis.departures import LOWEST_START, STRETCHES, Discrepancy
 from rig.analysis.equations import STRAY, Equations, ExpectedEdges, Residuals, Seen
 from rig.analysis.trajectory import (
     COMMON,
@@ -27,7 +26,7 @@ from rig.analysis.trajectory import (
     free_trajectory,
     struck_trajectory,
 )
-from rig.analysis.unknowns import Unknown, Unknowns, side_slopes
+from rig.analysis.unknowns import Unknown, Unknowns, prior_air, side_slopes
 from rig.arrays import Array, Flags, Index
 from rig.protocol.protocol import Protocol
 from rig.units import Quantity
@@ -63,7 +62,7 @@ class DropModel:
         The same for drops that differ only in their edges.
     owners
         Suffixes of the names of shared unknowns, by owner, if the drops of a joint fit come from
-        different rigs: see `rig.analysis.several`.
+        different rigs: see `rig.results.together`.
     """
 
     def __init__(
@@ -91,7 +90,9 @@ class DropModel:
         }
         if "impact" in self.records:
             record, edges = self.records["impact"], self.expected["impact"]
-            self.discrepancy = Discrepancy.of(record, edges, protocol, self._kappa)
+            self.discrepancy = Discrepancy.of(
+                record, edges.rods, edges.levels, protocol, self._kappa
+            )
         self._seen: dict[str, tuple[Index, Seen]] = {}
         self.unknowns = Unknowns(self)
         self.slopes = {role: side_slopes(self, role) for role in self.records}

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.chain_records import ChainRecord
+from rig.analysis.departures import drawn, lever, strike_shifts
 from rig.analysis.square_root import EquationRows
-from rig.analysis.swing import drawn, lever, strike_shifts
 from rig.arrays import Array, Flags, Index
 from rig.protocol.protocol import Protocol
 
@@ -106,7 +106,7 @@ class ExpectedEdges(NamedTuple):
     turn
         Sense of its rod's tilt: +1 for even rods, −1 for odd rods.
     drawn
-        Derivative of its height by swing, see `rig.analysis.swing.drawn`.
+        Derivative of its height by swing, see `rig.analysis.departures.drawn`.
     alone
         Whether the top rod falls alone, all rods below having struck.
     landed

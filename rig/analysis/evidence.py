@@ -34,7 +34,6 @@ half or three halves of this factor change no coverage by more than a percentage
 _INNER = 40  # steps; the next round of the joint fit continues
 _SETTLED = 1e-3  # relative change of variances at convergence
 _BINS = 64
-_MANY = 9  # rods still falling; more are counted as this many
 
 
 class Evidence:
@@ -145,28 +144,22 @@ class Evidence:
             Three rows with the coefficient of each component in each bin, then sums of squares,
             their variances (zero) and degrees of freedom; shape ``(6, bins)``.
         """
-        parts = zip(*self._edges, strict=True)
-        squares, speeds, loose = (np.concatenate(part) for part in parts)
+        squares, speeds, loose = (np.concatenate(part) for part in zip(*self._edges, strict=True))
+        order, places = np.lexsort((speeds, loose)), np.arange(loose.size)
+        changes = np.diff(loose[order], prepend=-1.0) != 0.0
         # A few bins give the same result as all edges.
-        edges = np.linspace(speeds.min(), speeds.max(), _BINS + 1)[1:-1]
-        after = loose > 0.0
-        falling = np.minimum(np.divide(1.0, loose, out=np.zeros_like(loose), where=after), _MANY)
-        place = np.digitize(speeds, edges) + _BINS * np.rint(falling).astype(np.intp)
-        bins = _BINS * (_MANY + 1)
-        counts: Array = np.bincount(place, minlength=bins).astype(np.float64)
-        sums: Array = np.bincount(place, squares, bins).astype(np.float64)
-        middles = np.bincount(place, speeds, bins) / np.maximum(counts, 1)
-        late = (np.bincount(place, loose, bins) > 0.0).astype(np.float64)
-        stated = self.stated.departures(loose)
-        departed = np.bincount(place, stated, bins) / np.maximum(counts, 1)
+        begins = np.flatnonzero(changes | (places % max(1, loose.size // _BINS) == 0))
+        columns = [squares, speeds, self.stated.departures(loose), loose > 0.0]
+        sums = np.add.reduceat(np.array(columns)[:, order], begins, axis=1)
+        counts = np.diff(begins, append=loose.size).astype(np.float64)
+        _, middles, departed, late = sums / counts
         departed /= self.stated.departure**2 or 1.0
         # Each determined unknown uses a degree of freedom, spread evenly over all speeds.
-        total, behind = max(1, squares.size), max(1, int(after.sum()))
+        total, behind = max(1, squares.size), max(1, int((loose > 0.0).sum()))
         taken = (parameters - struck) / total + late * struck / behind
-        full = counts > 0
         degrees = np.maximum(0.5, 1.0 - taken) * counts
         kinds = middles, np.ones_like(middles), departed
-        return np.stack([*kinds, sums, np.zeros_like(sums), degrees])[:, full]
+        return np.stack([*kinds, sums[0], np.zeros_like(middles), degrees])
 
     def _share(self, names: Sequence[str], members: Array, new: dict[str, float]) -> None:
         """Estimate the components a of a variance s² = Σ kinds·a².

@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rig.analysis.air import prior_air
 from rig.analysis.annealing import MISSED
 from rig.analysis.chain_records import ChainRecord, chain_records
 from rig.analysis.components import Components
@@ -37,6 +36,7 @@ from rig.analysis.identify import (
 )
 from rig.analysis.last_passages import APART
 from rig.analysis.score_test import scores
+from rig.analysis.unknowns import prior_air
 from rig.arrays import Array
 from rig.reasons import Reason, make_reason
 from rig.records import Drop

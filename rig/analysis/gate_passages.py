@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from rig.analysis.dual import Dual
 from rig.analysis.fit import DropFit
-from rig.analysis.plain_data import attributes
+from rig.analysis.plain_data import Record
 from rig.analysis.quantities import AdjustedDrop
 from rig.analysis.result import Measured
 from rig.protocol.protocol import Gate
 
 
 @dataclass(frozen=True, slots=True)
-class GatePassage:
+class GatePassage(Record):
     """Passage of an object's middle through a beam.
 
     Attributes
@@ -30,28 +29,21 @@ class GatePassage:
         Time since the previous gate, s; `None` at the first, or if the previous saw nothing.
     """
 
+    MEMBERS = "channel height_m speed_m_s=speed interval_s=interval?"
+
     channel: int
     height_m: float
     speed: Measured
     interval: Measured | None
 
-    def json(self) -> dict[str, Any]:
-        """Return a member of ``gates`` of a run."""
-        fields = attributes(self, "channel", "height_m") | {"speed_m_s": self.speed.json()}
-        return fields if self.interval is None else fields | {"interval_s": self.interval.json()}
 
-
-def gate_passages(
-    fit: DropFit, drop: AdjustedDrop, measured: Callable[[Dual], Measured]
-) -> tuple[GatePassage, ...]:
+def gate_passages(fit: DropFit, measured: Callable[[Dual], Measured]) -> tuple[GatePassage, ...]:
     """Return the passage of every gate that saw the object, from the top down.
 
     Parameters
     ----------
     fit
         Fit of the drop.
-    drop
-        The same drop with its unknowns.
     measured
         Function that returns a result for a value with its derivatives.
 
@@ -60,7 +52,7 @@ def gate_passages(
     tuple of GatePassage
         Empty for chains, whose rods pass a gate many times, and for a striking object.
     """
-    model = fit.model
+    model, drop = fit.model, AdjustedDrop(fit.model, fit.x)
     if not model.protocol.one_object or "free" not in model.records:
         return ()
     gates = model.protocol.gates
@@ -73,10 +65,12 @@ def gate_passages(
     passages: list[GatePassage] = []
     before: Dual | None = None
     for n, gate in sorted(enumerate(gates.gates), key=lambda numbered: -numbered[1].height):
-        when, speed = moment(drop, gate) if n in seen else (None, None)
-        if when is not None and speed is not None:
-            interval = None if before is None else measured(when - before)
-            passages.append(GatePassage(gate.channel, gate.height, measured(speed), interval))
+        if n not in seen:
+            before = None
+            continue
+        when, speed = moment(drop, gate)
+        interval = None if before is None else measured(when - before)
+        passages.append(GatePassage(gate.channel, gate.height, measured(speed), interval))
         before = when
     return tuple(passages)
 

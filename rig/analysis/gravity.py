@@ -11,15 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from rig.analysis.averages import mean
 from rig.analysis.evidence import STATED_WEIGHT
 from rig.analysis.fit import Fit, count_matched
-from rig.analysis.plain_data import attributes
-from rig.analysis.result import GOOD, DropResult, Measured
+from rig.analysis.plain_data import Record
+from rig.analysis.result import DropResult, Measured, good_runs
 from rig.analysis.square_root import square_root
 from rig.analysis.unknowns import ANY_GRAVITY
 from rig.measurands import GRAVITY
@@ -31,7 +30,7 @@ _FEWEST = 8  # edges
 
 
 @dataclass(frozen=True, slots=True)
-class GravityCheck:
+class GravityCheck(Record):
     """Gravity from the free chain, compared with the protocol's.
 
     Attributes
@@ -43,6 +42,8 @@ class GravityCheck:
     drops
         Number of drops.
     """
+
+    MEMBERS = "gravity_m_s2=measured stated_m_s2=stated.value drops normalized_error agrees"
 
     measured: Measured
     stated: Quantity
@@ -64,17 +65,9 @@ class GravityCheck:
         """Reason for a disagreement; empty if both values agree."""
         if self.agrees:
             return ()
-        found = {
-            "g": self.measured.value,
-            "U": self.measured.expanded,
-            "E_n": self.normalized_error,
-        }
-        return (make_reason("gravity_unlike", stated=self.stated.value, **found),)
-
-    def json(self) -> dict[str, Any]:
-        """Return ``gravity`` of ``calibration``."""
-        fields = {"gravity_m_s2": self.measured.json(), "stated_m_s2": self.stated.value}
-        return fields | attributes(self, "drops", "normalized_error", "agrees")
+        values = {"g": self.measured.value, "U": self.measured.expanded}
+        error, stated = self.normalized_error, self.stated.value
+        return (make_reason("gravity_unlike", stated=stated, E_n=error, **values),)
 
 
 def check_gravity(protocol: Protocol, results: Iterable[DropResult]) -> GravityCheck | None:
@@ -90,15 +83,9 @@ def check_gravity(protocol: Protocol, results: Iterable[DropResult]) -> GravityC
     GravityCheck or None
         `None` if no free chain passes gates.
     """
-    gravities = [
-        gravity
-        for result in results
-        if result.verdict in GOOD
-        and (gravity := result.quantities.get(GRAVITY.name, result.gravity)) is not None
-    ]
-    if not gravities:
-        return None
-    return GravityCheck(mean(gravities), protocol.gravity, len(gravities))
+    values = [run.quantities.get(GRAVITY.name, run.gravity) for run in good_runs(results)]
+    measured = [value for value in values if value is not None]
+    return GravityCheck(mean(measured), protocol.gravity, len(measured)) if measured else None
 
 
 def free_gravity(fit: Fit) -> Measured | None:

@@ -22,7 +22,7 @@ from rig.analysis.evidence import Evidence
 from rig.analysis.fit import DropFit, Fit, without_strays
 from rig.analysis.joint_step import DropGroup, JointDrop, group_drops, joint_step, with_priors
 from rig.analysis.likeness import Likeness, likeness
-from rig.analysis.plain_data import attributes
+from rig.analysis.plain_data import Record, attributes
 from rig.analysis.result import Measured
 from rig.analysis.square_root import Elimination
 from rig.analysis.unknowns import SharedUnknowns
@@ -46,7 +46,7 @@ _LEAST = {"floor": 5e-6, "departure": 5e-6, "few": 5e-6}
 
 
 @dataclass(frozen=True, slots=True)
-class RigEstimate:
+class RigEstimate(Record):
     """Results of a joint fit about the rig, without the drops.
 
     Attributes
@@ -58,6 +58,8 @@ class RigEstimate:
     drag
         κ in g − κv², 1/m, if it is estimated and not stated.
     """
+
+    MEMBERS = "learned likeness?"
 
     learned: Mapping[str, Any]
     likeness: Likeness | None

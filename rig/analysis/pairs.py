@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from itertools import groupby
+from operator import attrgetter
 
 import numpy as np
 
 from rig.analysis.averages import combine
-from rig.analysis.plain_data import attributes
-from rig.analysis.result import GOOD, DropResult, Measured
+from rig.analysis.plain_data import Record
+from rig.analysis.result import DropResult, Measured, good_runs
 from rig.arrays import Array
 from rig.measurands import MEASURANDS
 from rig.protocol.plan import runs as planned_runs
@@ -26,13 +27,13 @@ _CHAINS_OWN = ("spacing", "width")  # common lines of a budget that differ betwe
 
 
 @dataclass(frozen=True, slots=True)
-class Effects:
+class Effects(Record):
     """Effects at an incline.
 
     Attributes
     ----------
-    first, second
-        The chains: A and B.
+    chains
+        Names of the chains, A and B.
     blocks
         Number of complete blocks of good runs.
     chain
@@ -42,17 +43,13 @@ class Effects:
         of the sides: the delay of the free side's release.
     """
 
+    MEMBERS = "incline_deg blocks chain side chains"
+
     incline_deg: float
-    first: str
-    second: str
+    chains: tuple[str, str]
     blocks: int
     chain: Mapping[str, Measured]
     side: Mapping[str, Measured]
-
-    def json(self) -> dict[str, Any]:
-        """Return a member of ``effects``."""
-        fields = attributes(self, "incline_deg", "blocks", "chain", "side")
-        return fields | {"chains": [self.first, self.second]}
 
 
 def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects, ...]:
@@ -71,24 +68,24 @@ def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects,
     if protocol.plan.order != "ABBA" or len(protocol.chains) < 2 or protocol.surface is None:
         return ()
     first, second = list(protocol.chains)[:2]
-    good = {result.run.number: result for result in results if result.verdict in GOOD}
-    planned: dict[float, list[int]] = {}
-    for run in planned_runs(protocol):
-        planned.setdefault(run.incline_deg, []).append(run.number)
-    every = []
-    for incline, numbers in sorted(planned.items()):
-        fours = [numbers[start : start + 4] for start in range(0, len(numbers), 4)]
-        full = [[good[number] for number in four] for four in fours if good.keys() >= {*four}]
-        # A shuffled plan has no ABBA blocks.
-        order = [first, second, second, first]
-        blocks = [block for block in full if [drop.run.impact for drop in block] == order]
+    order = [first, second, second, first]
+    good = {result.run: result for result in good_runs(results)}
+    signs = np.array([1.0, -1.0, -1.0, 1.0])  # first chain less second, for each run of a block
+    planned, every = sorted(planned_runs(protocol), key=attrgetter("incline_deg")), []
+    for incline, group in groupby(planned, attrgetter("incline_deg")):
+        runs = [*group]
+        fours = zip(*(runs[place::4] for place in range(4)), strict=False)
+        blocks = [
+            [good[run] for run in four]
+            for four in fours
+            # A shuffled plan has no ABBA blocks.
+            if good.keys() >= {*four} and [run.impact for run in four] == order
+        ]
         if blocks:
-            # First chain less second, for each run of a block.
-            signs = np.array([1.0 if name == first else -1.0 for name in order])
             rows = [row for row in MEASURANDS.values() if row.name in blocks[0][0].quantities]
             chain = {r.name: _effect(blocks, r.name, signs / 2.0) for r in rows if r.by_chain}
             side = {r.name: _effect(blocks, r.name, signs**2 / 4.0) for r in rows if r.by_side}
-            every.append(Effects(incline, first, second, len(blocks), chain, side))
+            every.append(Effects(incline, (first, second), len(blocks), chain, side))
     return tuple(every)
 
 

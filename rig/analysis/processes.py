@@ -5,7 +5,7 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from itertools import islice
@@ -24,13 +24,9 @@ _BATCH = 16  # tasks for each process that are read at once
 
 
 def do_in_order(
-    work: Callable[[Task], Result],
-    tasks: Iterable[Task],
-    take: Callable[[Task, Result], None],
-    total: int,
-    processes: int = 1,
-) -> None:
-    """Call `work` for each task, and `take` with each result in the order of the tasks.
+    work: Callable[[Task], Result], tasks: Iterable[Task], total: int, processes: int = 1
+) -> Generator[tuple[Task, Result]]:
+    """Call `work` for each task, and yield each task with its result, in order.
 
     Parameters
     ----------
@@ -38,8 +34,6 @@ def do_in_order(
         Function; of module level if other processes may be used.
     tasks
         Tasks, read a batch at a time.
-    take
-        Called with each task and its result, in this process.
     total
         Number of tasks.
     processes
@@ -47,7 +41,7 @@ def do_in_order(
     """
     remaining, began = iter(tasks), perf_counter()
     for number, task in enumerate(remaining, 1):
-        take(task, work(task))
+        yield task, work(task)
         ahead_s = (perf_counter() - began) / number * (total - number)
         if processes > 1 and number >= _LOOK and ahead_s > _WORTH_S:
             break
@@ -61,7 +55,7 @@ def do_in_order(
                 # Not map: on close it cancels pending tasks, which fails in a broken pool.
                 results = [executor.submit(work, task) for task in batch]
             for task, result in zip(batch, results, strict=True):
-                take(task, result.result())
+                yield task, result.result()
     except BaseException:
         for process in multiprocessing.active_children():  # do not wait for running tasks
             process.kill()

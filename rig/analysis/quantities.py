@@ -1,76 +1,22 @@
-"""The measurands as functions of the fitted unknowns, and the lines of their budget."""
+"""The measurands as functions of the fitted unknowns."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
 
-from rig.analysis.air import lags, slack
-from rig.analysis.discrepancy import STRETCHES
+from rig.analysis.departures import STRETCHES, lags, lever, slack
 from rig.analysis.drop_model import DropModel
 from rig.analysis.dual import Dual
-from rig.analysis.swing import lever
 from rig.analysis.trajectory import Trajectory
 from rig.arrays import Array
-from rig.protocol.protocol import GUESSED
 
 _STEP = 1e-3
 """Way over which a rod's speed along its chain is taken, m: strings act over a hundred times it."""
-
-
-class BudgetLine(NamedTuple):
-    """Properties of a line of the uncertainty budget.
-
-    Attributes
-    ----------
-    common
-        Whether the error is the same in every run, so that averaging does not reduce it.
-    guessed
-        Whether its size is an assumption, unless a joint fit estimates it.
-    scale
-        Variance component that a joint fit estimates, and whose degrees of freedom the line has.
-    known
-        Input that could be measured better, with the protocol's key; empty if there is none.
-    """
-
-    common: bool = False
-    guessed: bool = False
-    scale: str = ""
-    known: str = ""
-
-
-BUDGET = {
-    "edges": BudgetLine(scale="jitter"),
-    "clock": BudgetLine(common=True, known="the clock's rate"),
-    "gravity": BudgetLine(common=True, known="gravity (`gravity`)"),
-    "air": BudgetLine(common=True, known="the air's drag (`drag`)"),
-    "drop height": BudgetLine(common=True, known="the drop height (`drop`)"),
-    "datum": BudgetLine(common=True, known="the zero of each post (`datum_uncertainty`)"),
-    "beam heights": BudgetLine(
-        common=True, scale="gates", known="the heights of the beams (`height_uncertainty`)"
-    ),
-    "side": BudgetLine(
-        common=True, guessed=True, known="how much higher one side hangs (`priors: side`)"
-    ),
-    "beam offsets": BudgetLine(
-        common=True, guessed=True, scale="beam", known="the aim of the beams (`beam_offset`)"
-    ),
-    "spacing": BudgetLine(common=True, scale="rods", known="the spacing (`position_uncertainty`)"),
-    "width": BudgetLine(common=True, known="the width (`width_uncertainty`)"),
-    "start height": BudgetLine(guessed=True, scale="hang"),
-    "swing": BudgetLine(guessed=True, scale="swing"),
-    "single impulses": BudgetLine(guessed=True, scale="impulse"),
-    "top rod": BudgetLine(guessed=True, scale="departure"),
-    "stretch": BudgetLine(common=True, guessed=True, scale="stretch"),
-    "late pull": BudgetLine(guessed=True, scale="bounce"),
-    "contact": BudgetLine(guessed=True),
-}
-COMMON = tuple(name for name, line in BUDGET.items() if line.common)
 
 
 def measurands(model: DropModel, x: Array) -> dict[str, Dual]:
@@ -80,30 +26,12 @@ def measurands(model: DropModel, x: Array) -> dict[str, Dual]:
     return {name: value for name, value in values if value is not None}
 
 
-def effective_degrees(u: float, budget: Mapping[str, float], degrees: Mapping[str, float]) -> float:
-    """Return the effective degrees of freedom by Welch–Satterthwaite (GUM G.4); at least 1.
+class Arrival(NamedTuple):
+    """Arrival of the top rod at a height above the contact level, m: speed, m/s, and time, s."""
 
-    Parameters
-    ----------
-    budget
-        Lines whose squares add up to that of `u`.
-    degrees
-        Degrees of freedom of lines; `GUESSED` for other guessed lines, infinite for the rest.
-    """
-    share = sum(
-        (line / u) ** 4 / degrees.get(name, GUESSED)
-        for name, line in budget.items()
-        if name in degrees or BUDGET[name].guessed
-    )
-    return max(1.0, 1.0 / share) if share > 0.0 else math.inf
-
-
-class _Strike(NamedTuple):
-    """Strike of the top rod: height above the contact level, time and speed."""
-
-    above: Dual
-    when: Dual
     speed: Dual
+    when: Dual
+    above: Dual | float = 0.0
 
 
 @dataclass(frozen=True)
@@ -202,19 +130,11 @@ class AdjustedDrop:
         """Gain of speed of the top rod by a late last pull, m/s."""
         return self.linear("late", self.model.discrepancy.late_pull)
 
-    @property
-    def speed(self) -> Dual:
-        """Speed V of the top rod at the contact level, m/s."""
-        return self._arrival[0]
-
-    @property
-    def hit(self) -> Dual:
-        """Time at which the top rod passes the contact level, s."""
-        return self._arrival[1]
-
     @cached_property
-    def _arrival(self) -> tuple[Dual, Dual]:
-        """V and its time, from the path and first-order corrections.
+    def arrival(self) -> Arrival:
+        """Arrival of the top rod's middle at the contact level, with V.
+
+        This is the path with first-order corrections.
 
         The top rod is ahead of its place by w and faster than its chain by w′: it arrives
         e = w/(V + w′) earlier, and slower by g·e. A late pull acts over the distance below the
@@ -227,7 +147,7 @@ class AdjustedDrop:
         early = self.ahead("impact", level)[0] / fast
         speed = fast - self.gravity * early
         later = 0.5 * self.model.discrepancy.late_way * self.late / (speed * speed)
-        return speed + self.late, hit - early - later
+        return Arrival(speed + self.late, hit - early - later)
 
     @cached_property
     def skew(self) -> Dual:
@@ -235,21 +155,21 @@ class AdjustedDrop:
         return self.release("free") - self.release("impact")
 
     @cached_property
-    def strike(self) -> _Strike | None:
+    def strike(self) -> Arrival | None:
         """Strike of the top rod, a ballistic leg away from the contact level.
 
         `None` without impacts, or if the strike is higher than the speed at the level allows.
         """
         if not self.strikes:
             return None
-        speed, contact = self.speed, self.model.protocol.contact
+        (speed, hit, _), contact = self.arrival, self.model.protocol.contact
         above = contact.strike.value + self.linear("contact") + self.linear("strike")
         kappa = Dual(self._path("impact").kappa, self.linear("drag").slopes)
         squared = speed * speed - 2.0 * above * (self.gravity - kappa * speed * speed)
         if squared.value <= 0.0:
             return None
         end = squared.root()
-        return _Strike(above, self.hit - 2.0 * above / (speed + end), end)
+        return Arrival(end, hit - 2.0 * above / (speed + end), above)
 
     def apart(self, when: Dual) -> Dual:
         """Return the height of the free chain's top rod above the contact point at `when`, m."""
@@ -266,17 +186,19 @@ def _acceleration(drop: AdjustedDrop, *, track: bool) -> Dual | None:
 COMPUTED: dict[str, Callable[[AdjustedDrop], Dual | None]] = {
     # The free chain is read after the same time since its own release as the striking chain. No
     # model of its later fall is needed.
-    "separation_m": lambda drop: drop.apart(drop.hit + drop.skew) if drop.both else None,
-    "separation_raw_m": lambda drop: drop.apart(drop.hit) if drop.both else None,
+    "separation_m": lambda drop: drop.apart(drop.arrival.when + drop.skew) if drop.both else None,
+    "separation_raw_m": lambda drop: drop.apart(drop.arrival.when) if drop.both else None,
     "separation_strike_m": lambda drop: (
         drop.apart(drop.strike.when + drop.skew) - drop.strike.above
         if drop.both and drop.strike
         else None
     ),
     "release_skew_s": lambda drop: drop.skew if drop.both else None,
-    "speed_m_s": lambda drop: drop.speed if drop.strikes else None,
+    "speed_m_s": lambda drop: drop.arrival.speed if drop.strikes else None,
     "speed_strike_m_s": lambda drop: drop.strike.speed if drop.strike else None,
-    "fall_time_s": lambda drop: drop.hit - drop.release("impact") if drop.strikes else None,
+    "fall_time_s": lambda drop: (
+        drop.arrival.when - drop.release("impact") if drop.strikes else None
+    ),
     "gravity_m_s2": partial(_acceleration, track=False),
     "acceleration_m_s2": partial(_acceleration, track=True),
 }

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rig.analysis.distributions import coverage_factor
-from rig.analysis.plain_data import attributes, plain
+from rig.analysis.plain_data import Record, spread
 from rig.reasons import Reason, reasons_json, rig_error
+from rig.records import Job
 
 if TYPE_CHECKING:  # results are shown, and predictions made, where no drop is analysed
     import numpy as np
@@ -66,7 +67,7 @@ class Deviation(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Measured:
+class Measured(Record):
     """A measured value.
 
     Attributes
@@ -83,6 +84,8 @@ class Measured:
     deviation
         Variance about the model's prediction if the model holds.
     """
+
+    MEMBERS = "value u U95=expanded"
 
     value: float
     u: float
@@ -118,13 +121,9 @@ class Measured:
         """
         return optional_package("uncertainties").ufloat(self.value, self.u)
 
-    def json(self) -> dict[str, float]:
-        """Return ``{"value", "u", "U95"}``."""
-        return {"value": self.value, "u": self.u, "U95": self.expanded}
-
 
 @dataclass(frozen=True, slots=True)
-class Audit:
+class Audit(Record):
     """Edge counts of a drop.
 
     Attributes
@@ -145,6 +144,8 @@ class Audit:
         Spurious edges in the middle of long flickers, which the fit did not use.
     """
 
+    MEMBERS = "received matched missed spurious lost thinned?"
+
     received: int = 0
     matched: int = 0
     missed: int = 0
@@ -164,14 +165,9 @@ class Audit:
         changes = {"matched": matched, "missed": missed, "spurious": spurious}
         return replace(self, **changes, unexplained=unexplained)
 
-    def json(self) -> dict[str, int]:
-        """Return ``edges`` of a run as `rig analyze --json` prints it."""
-        counts = attributes(self, *COUNTS)
-        return counts | ({"thinned": self.thinned} if self.thinned else {})
-
 
 @dataclass(frozen=True, slots=True)
-class DropResult:
+class DropResult(Record):
     """All results of a drop.
 
     Attributes
@@ -199,6 +195,12 @@ class DropResult:
         Gravity from the free chain, m/s², see `rig.analysis.gravity`; `None` if not computed.
     """
 
+    MEMBERS = (
+        "run=run.number attempt incline_deg=run.incline_deg impact_chain=run.impact damaged? "
+        "*quantities edges=audit unexplained_edges=audit.unexplained *causes gates? scatter? "
+        "last_passages? alone? learned verdict *explained degrees budget"
+    )
+
     run: Run
     attempt: int
     verdict: Verdict
@@ -216,6 +218,11 @@ class DropResult:
     gravity: Measured | None = None
 
     @property
+    def job(self) -> Job:
+        """Run and attempt."""
+        return Job(self.run.number, self.attempt)
+
+    @property
     def matches(self) -> dict[int, int]:
         """Rod of each matched edge, by the edge's number in the drop."""
         return {n: rod for n, rod in enumerate(self.rods) if rod >= 0}
@@ -225,22 +232,34 @@ class DropResult:
         """Whether `quantities` come from the joint fit."""
         return bool(self.alone)
 
-    def json(self) -> dict[str, Any]:
-        """Return a member of ``runs``."""
-        fields: dict[str, Any] = {"run": self.run.number, "attempt": self.attempt}
-        fields |= {"incline_deg": self.run.incline_deg, "impact_chain": self.run.impact}
-        fields |= {"damaged": True} if self.damaged else {}
-        fields |= plain(self.quantities)
-        fields |= {"edges": self.audit.json(), "unexplained_edges": self.audit.unexplained}
-        if self.rods:
-            fields["causes"] = plain(self.unmatched)
-        names = ("gates", "scatter", "last_passages", "alone")
-        fields |= attributes(self, *(name for name in names if getattr(self, name)))
-        fields |= attributes(self, "learned", "verdict") | reasons_json(self.reasons)
-        fields["degrees"] = plain({name: m.degrees for name, m in self.quantities.items()})
-        fields["budget"] = [
-            {"name": source, "quantity": name, "u": u}
-            for name, value in self.quantities.items()
-            for source, u in value.budget.items()
-        ]
-        return fields
+    @property
+    def causes(self) -> dict[str, Sequence[UnmatchedEdge]]:
+        """Unmatched edges of a fitted drop, for JSON."""
+        return {"causes": self.unmatched} if self.rods else {}
+
+    @property
+    def explained(self) -> dict[str, list[Any]]:
+        """Reasons as sentences and as codes, for JSON."""
+        return reasons_json(self.reasons)
+
+    @property
+    def degrees(self) -> dict[str, float]:
+        """Degrees of freedom of each quantity."""
+        return {name: value.degrees for name, value in self.quantities.items()}
+
+    @property
+    def budget(self) -> list[dict[str, Any]]:
+        """Contribution of each source to each quantity."""
+        return spread({name: value.budget for name, value in self.quantities.items()})
+
+
+def good_runs(results: Iterable[DropResult], *, rejected: bool = False) -> list[DropResult]:
+    """Return the results of good drops.
+
+    Parameters
+    ----------
+    rejected
+        Whether to include drops that are good by their limits but were rejected by the operator.
+    """
+    verdicts = [(result, result.limits if rejected else None) for result in results]
+    return [result for result, limits in verdicts if {result.verdict, limits} & {*GOOD}]

@@ -52,18 +52,15 @@ def prior_sensitivity(analysis: Analysis) -> list[dict[str, Any]]:
     return rows
 
 
-def _again(protocol: Protocol, analysis: Analysis) -> list[Incline]:
+def _again(protocol: Protocol, analysis: Analysis) -> tuple[Incline, ...]:
     """Return the summary with the priors of another protocol; empty if the fit diverges."""
     fits = [replace(drop, model=drop.model.under(protocol)) for drop in analysis.adjusted.values()]
     joints = [joint_fit(fits)] if analysis.joint else [by_itself(alone(fit)) for fit in fits]
     if analysis.joint and not joints[0].settled:
-        return []
+        return ()
     results = [fit.measure_all(drop) for fit in map(Budgets, joints) for drop in fit.joint.drops]
     by_job = dict(zip(analysis.adjusted, results, strict=True))
-    runs = [
-        replace(run, quantities=by_job.get((run.run.number, run.attempt), run.quantities))
-        for run in analysis.runs
-    ]
+    runs = [replace(run, quantities=by_job.get(run.job, run.quantities)) for run in analysis.runs]
     return summarize(protocol, runs)
 
 

@@ -1,11 +1,13 @@
-"""Analysis of a session: each drop by itself, then the joint fit and the summary."""
+"""Analysis of sessions: each drop by itself, then the joint fit and the summary."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
-from operator import length_hint
-from typing import Any, Generic, NamedTuple, TypeVar
+from functools import lru_cache
+from operator import attrgetter, length_hint
+from typing import NamedTuple
 from typing import Protocol as Interface
 
 from rig.analysis.budgets import Budgets
@@ -15,7 +17,7 @@ from rig.analysis.fit import DropFit, Fit, alone
 from rig.analysis.joint_fit import FEWEST, JointFit, RigEstimate, joint_fit
 from rig.analysis.joint_step import JointDrop
 from rig.analysis.pairs import Effects, effects
-from rig.analysis.plain_data import attributes, plain
+from rig.analysis.plain_data import Record
 from rig.analysis.processes import do_in_order
 from rig.analysis.result import GOOD, DropResult
 from rig.analysis.summary import Incline, summarize
@@ -25,13 +27,15 @@ from rig.protocol.measurable import check_gates, check_measurable
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Protocol, Run
 from rig.reasons import Reason, make_reason, rig_error
-from rig.records import Drop
+from rig.records import Drop, Job
 from rig.threads import one_thread
 
 Progress = Callable[[int, int], None]
+Causes = Mapping[tuple[int, int], Sequence[Reason]]
+"""Causes by run and attempt, for drops that the operator rejected."""
 
-K = TypeVar("K")
-
+Key = tuple[int, Job]
+"""A session's place, and a drop of it."""
 _EXPLAINED = 6  # void drops of a session for which set-up faults are searched
 KEPT = 0.9
 """Least share of its matched edges that a drop must keep in the joint fit: with fewer, its result
@@ -49,7 +53,7 @@ class SummaryByDrop(Interface):
 
 
 @dataclass(frozen=True, slots=True)
-class Analysis:
+class Analysis(Record):
     """All results of a session.
 
     Attributes
@@ -75,12 +79,16 @@ class Analysis:
         The summary including rejected runs that are good by their limits; empty if there are none.
     """
 
+    MEMBERS = (
+        "runs summary superseded? summary_with_rejected=with_rejected? *failure effects? *rig?"
+    )
+
     runs: tuple[DropResult, ...]
     superseded: tuple[DropResult, ...]
     summary: tuple[Incline, ...]
     rig: RigEstimate | None = None
     joint: JointFit | None = field(default=None, compare=False)
-    adjusted: Mapping[tuple[int, int], Fit | JointDrop] = field(default_factory=dict, compare=False)
+    adjusted: Mapping[Job, Fit | JointDrop] = field(default_factory=dict, compare=False)
     effects: tuple[Effects, ...] = ()
     with_rejected: tuple[Incline, ...] = ()
     unsettled: bool = False
@@ -88,8 +96,7 @@ class Analysis:
     @property
     def drops(self) -> list[DropResult]:
         """All attempts at all runs, by run and attempt."""
-        drops = (*self.runs, *self.superseded)
-        return sorted(drops, key=lambda drop: (drop.run.number, drop.attempt))
+        return sorted((*self.runs, *self.superseded), key=attrgetter("job"))
 
     @property
     def damaged(self) -> tuple[DropResult, ...]:
@@ -99,23 +106,33 @@ class Analysis:
     @property
     def damage(self) -> list[str]:
         """A line that counts and names the damaged drops; empty if there are none."""
-        names = "; ".join(f"run {drop.run.number}, attempt {drop.attempt}" for drop in self.damaged)
+        names = "; ".join(str(drop.job) for drop in self.damaged)
         count = f"{len(self.damaged)} of {len(self.drops)} drops"
         line = f"damaged records, left out: {count} ({names}); see rig recover SESSION"
         return [line] if names else []
 
-    def json(self) -> dict[str, Any]:
-        """Return the object that `rig analyze --json` prints."""
-        where_there_are = {
-            "superseded": self.superseded or None,
-            "summary_with_rejected": self.with_rejected or None,
-            "joint_fit_converged": False if self.unsettled else None,
-            "effects": self.effects or None,
-            "learned": None if self.rig is None else self.rig.learned,
-            "likeness": None if self.rig is None else self.rig.likeness,
-        }
-        fields = {name: plain(part) for name, part in where_there_are.items() if part is not None}
-        return attributes(self, "runs", "summary") | fields
+    @property
+    def failure(self) -> dict[str, bool]:
+        """Whether the joint fit failed, for JSON; empty if it did not."""
+        return {"joint_fit_converged": False} if self.unsettled else {}
+
+
+class SessionDrops(NamedTuple):
+    """Drops of a session, each analysed by itself.
+
+    Attributes
+    ----------
+    protocol
+        The scene and its plan.
+    results
+        Result of each drop.
+    fits
+        Fits of those that take part in a joint fit, by run and attempt.
+    """
+
+    protocol: Protocol
+    results: Iterable[DropResult]
+    fits: Mapping[Job, DropFit]
 
 
 @one_thread
@@ -123,7 +140,7 @@ def analyze(
     protocol: Protocol,
     drops: Iterable[Drop],
     scale: Callable[[Drop], TimeScale],
-    rejected: Mapping[tuple[int, int], Sequence[Reason]] | None = None,
+    rejected: Causes | None = None,
     progress: Progress | None = None,
     summaries: SummaryByDrop | None = None,
     total: int | None = None,
@@ -140,7 +157,7 @@ def analyze(
     scale
         Function that returns the calibration of a drop's ticks.
     rejected
-        Causes by (run, attempt), for drops that the operator rejected.
+        As for `gather`.
     progress
         Called with the number of drops done and the total.
     summaries
@@ -157,34 +174,27 @@ def analyze(
     """
     check_gates(protocol)
     check_measurable(protocol)
-    planned = {run.number: run for run in planned_runs(protocol)}
-    summaries, rejected = {} if summaries is None else summaries, rejected or {}
-    total = length_hint(drops) if total is None else total
-    results: list[DropResult] = []
-    drops_adjusted: list[DropFit | None] = []
-    unexplained = 0
+    known: SummaryByDrop = {} if summaries is None else summaries
+    total = total or length_hint(drops)
 
-    def take(task: tuple[DropCase, DropSummary | None], summary: DropSummary) -> None:
-        nonlocal unexplained
-        case, before = task
-        # A fault of the rig affects every drop: searching in a few drops suffices.
-        explain = unexplained < _EXPLAINED
-        if summary.needs_explanation and summary.explained != explain:
-            summary = case.summary(summary, explain=explain)
-        unexplained += summary.needs_explanation
-        if summary is not before:
-            summaries[case.drop] = summary
-        result = overrule(summary.result, rejected.get((case.run.number, case.drop.attempt)))
-        results.append(result)
-        drops_adjusted.append(case.restore_drop(summary) if joins(protocol, result) else None)
-        if progress is not None:
-            progress(len(results), total)
+    def summarize_drops() -> Generator[tuple[DropCase, DropSummary]]:
+        cases = (drop_case(protocol, drop, scale(drop)) for drop in drops)
+        tasks = ((case, known.get(case.drop)) for case in cases)
+        analysed, unexplained = do_in_order(_summarize, tasks, total, processes), 0
+        for done, ((case, before), first) in enumerate(analysed, 1):
+            # A fault of the rig affects every drop: searching in a few drops suffices.
+            explain = unexplained < _EXPLAINED
+            again = first.needs_explanation and first.explained != explain
+            summary = case.summary(first, explain=explain) if again else first
+            unexplained += summary.needs_explanation
+            if summary is not before:
+                known[case.drop] = summary
+            yield case, summary
+            if progress is not None:
+                progress(done, total)
 
-    cases = (DropCase(protocol, planned_run(planned, drop), drop, scale(drop)) for drop in drops)
-    do_in_order(
-        _summarize, ((case, summaries.get(case.drop)) for case in cases), take, total, processes
-    )
-    return gather(protocol, results, drops_adjusted)
+    with closing(summarize_drops()) as summarized:  # ends other processes
+        return gather(protocol, summarized, rejected or {})
 
 
 def _summarize(task: tuple[DropCase, DropSummary | None]) -> DropSummary:
@@ -194,37 +204,40 @@ def _summarize(task: tuple[DropCase, DropSummary | None]) -> DropSummary:
     return case.summary(before, explain=False)
 
 
-def planned_run(planned: Mapping[int, Run], drop: Drop) -> Run:
-    """Return the planned run of a drop.
+@lru_cache(maxsize=8)
+def plan_of(protocol: Protocol) -> Mapping[int, Run]:
+    """Return the planned runs by number."""
+    return {run.number: run for run in planned_runs(protocol)}
+
+
+def drop_case(protocol: Protocol, drop: Drop, scale: TimeScale) -> DropCase:
+    """Return a drop with its planned run.
 
     Raises
     ------
     InputError
         The plan has no run of this number.
     """
+    planned = plan_of(protocol)
     if drop.run not in planned:
         if drop.damage:  # the damage may be in its number
             raise rig_error("record_damaged", text=f"run {drop.run}: {drop.damage}")
         raise rig_error("run_not_planned", run=drop.run, planned=len(planned))
-    return planned[drop.run]
+    return DropCase(protocol, planned[drop.run], drop, scale)
 
 
-def overrule(result: DropResult, causes: Sequence[Reason] | None) -> DropResult:
-    """Return a result rejected for the operator's causes; unchanged if there are none."""
+def overrule(result: DropResult, rejected: Causes) -> DropResult:
+    """Return a drop's result, rejected if the operator rejected the drop."""
+    causes = rejected.get(result.job)
     if causes is None:
         return result
     reasons = (*causes, *result.reasons)
     return replace(result, verdict="rejected", reasons=reasons, limits=result.verdict)
 
 
-def joins(protocol: Protocol, result: DropResult) -> bool:
-    """Whether a drop takes part in the joint fit, given its own result."""
-    return result.verdict in GOOD or nearly_in_time(result, protocol.accept.release_skew)
-
-
 @one_thread
 def gather(
-    protocol: Protocol, results: Sequence[DropResult], drops: Sequence[DropFit | None]
+    protocol: Protocol, drops: Iterable[tuple[DropCase, DropSummary]], rejected: Causes
 ) -> Analysis:
     """Fit drops together that were analysed individually, and summarize.
 
@@ -232,106 +245,93 @@ def gather(
     ----------
     protocol
         The scene and its plan.
-    results, drops
-        Each drop's own result and fit; `None` for the fit of a drop that does not take part.
-    """
-    good = {n: drop for n, drop in enumerate(drops) if drop is not None}
-    together = fit_together(dict(enumerate(results)), good)
-    adjusted = {
-        (result.run.number, result.attempt): drop if isinstance(drop, JointDrop) else alone(drop)
-        for n, drop in together.drops.items()
-        if (result := together.results[n]).verdict in GOOD
-    }
-    analysis = sum_up(protocol, together.results.values(), together.joint, adjusted)
-    return replace(analysis, unsettled=not together.settled)
-
-
-def sum_up(
-    protocol: Protocol,
-    results: Iterable[DropResult],
-    joint: JointFit | None = None,
-    adjusted: Mapping[tuple[int, int], Fit | JointDrop] | None = None,
-) -> Analysis:
-    """Return the analysis of a session from the results of its drops.
-
-    Parameters
-    ----------
-    protocol
-        The scene and its plan.
-    results
-        Result of each drop.
-    joint, adjusted
-        As in `Analysis`.
-    """
-    ordered = sorted(results, key=lambda result: (result.run.number, result.attempt))
-    last = {result.run.number: result for result in ordered}
-    latest = tuple(last.values())
-    earlier = tuple(result for result in ordered if last[result.run.number] is not result)
-    summary = tuple(summarize(protocol, latest))
-    spared = any(result.limits in GOOD for result in latest)
-    with_rejected = tuple(summarize(protocol, latest, rejected=True)) if spared else ()
-    paired = effects(protocol, latest)
-    rig = None if joint is None else joint.rig
-    return Analysis(latest, earlier, summary, rig, joint, adjusted or {}, paired, with_rejected)
-
-
-class FittedTogether(NamedTuple, Generic[K]):
-    """Drops after a joint fit.
-
-    Attributes
-    ----------
-    joint
-        `None` if there are too few drops, or their fit did not converge.
-    results
-        Results of all drops.
     drops
-        Drops of the joint fit; without a joint fit, the input to it.
-    settled
-        Whether no fit failed.
+        Drops with their own summaries.
+    rejected
+        Causes by run and attempt, for drops that the operator rejected.
     """
+    results, fits = [], dict[Job, DropFit]()
+    for case, summary in drops:
+        result = overrule(summary.result, rejected)
+        results.append(result)
+        if result.verdict in GOOD or nearly_in_time(result, protocol.accept.release_skew):
+            fit = case.restore_drop(summary)
+            fits |= {} if fit is None else {result.job: fit}
+    return fit_sessions([SessionDrops(protocol, results, fits)])[0]
 
-    joint: JointFit | None
-    results: dict[K, DropResult]
-    drops: Mapping[K, DropFit]
-    settled: bool = True
 
-
-def fit_together(results: Mapping[K, DropResult], drops: Mapping[K, DropFit]) -> FittedTogether[K]:
-    """Fit good drops together and update their results.
+def fit_sessions(parts: Sequence[SessionDrops]) -> list[Analysis]:
+    """Fit the drops of sessions together, and return the analysis of each session.
 
     A verdict depends on the drop alone, by limits fixed beforehand. The joint fit changes values,
     and a verdict only where the drop alone cannot decide whether the release skew is within its
-    limit. A drop that loses matched edges in the joint fit is left out and keeps its own values.
-
-    Parameters
-    ----------
-    results, drops
-        Results of all drops, and the fits of the good ones.
+    limit.
     """
-    outcome, good = dict(results), dict(drops)
-    while len(good) >= FEWEST:
-        joint = joint_fit(list(good.values()))
+    results = {(n, result.job): result for n, part in enumerate(parts) for result in part.results}
+    fits = {(n, job): fit for n, part in enumerate(parts) for job, fit in part.fits.items()}
+    joint, settled = _fit_jointly(results, fits)
+    if joint is not None:
+        budgets = Budgets(joint)
+        for key, drop in zip(fits, joint.drops, strict=True):
+            fits[key], results[key] = drop, _joint_result(results[key], drop, budgets)
+    analyses = []
+    for n, part in enumerate(parts):
+        own = [results[key] for key in results if key[0] == n]
+        adjusted = {
+            job: fit if isinstance(fit, JointDrop) else alone(fit)
+            for (place, job), fit in fits.items()
+            if place == n and results[place, job].verdict in GOOD
+        }
+        analysis = sum_up(part.protocol, own, joint)
+        analyses.append(replace(analysis, adjusted=adjusted, unsettled=not settled))
+    return analyses
+
+
+def sum_up(
+    protocol: Protocol, results: Iterable[DropResult], joint: JointFit | None = None
+) -> Analysis:
+    """Return the analysis of a session from the results of its drops, and perhaps a joint fit."""
+    ordered = sorted(results, key=attrgetter("job"))
+    last = {result.run.number: result for result in ordered}
+    latest = tuple(last.values())
+    earlier = tuple(result for result in ordered if last[result.run.number] is not result)
+    spared = any(result.limits in GOOD for result in latest)
+    with_rejected = summarize(protocol, latest, rejected=True) if spared else ()
+    summary, paired = summarize(protocol, latest), effects(protocol, latest)
+    rig = None if joint is None else joint.rig
+    return Analysis(
+        latest, earlier, summary, rig, joint, effects=paired, with_rejected=with_rejected
+    )
+
+
+def _fit_jointly(
+    results: dict[Key, DropResult], fits: dict[Key, DropFit]
+) -> tuple[JointFit | None, bool]:
+    """Fit drops together: the joint fit, if there is one, and whether no fit failed.
+
+    A drop that loses matched edges in the joint fit is taken out of `fits`, with a reason in
+    `results`, and keeps its own values.
+    """
+    drops = len(fits)
+    while len(fits) >= FEWEST:
+        joint = joint_fit(list(fits.values()))
         fewer = {
             key: drop.match_count
-            for (key, fit), drop in zip(good.items(), joint.drops, strict=joint.settled)
+            for (key, fit), drop in zip(fits.items(), joint.drops, strict=joint.settled)
             if drop.match_count < KEPT * fit.match_count
         }
         # If most drops are left out, the fit has failed, not the drops.
-        if not joint.settled or 2 * (len(drops) - len(good) + len(fewer)) > len(drops):
-            return FittedTogether(None, outcome, good, settled=False)
+        if not joint.settled or 2 * (drops - len(fits) + len(fewer)) > drops:
+            return None, False
         if not fewer:
-            adjusted, budgets = dict(zip(good, joint.drops, strict=True)), Budgets(joint)
-            light = {
-                key: _joint_result(outcome[key], drop, budgets) for key, drop in adjusted.items()
-            }
-            return FittedTogether(joint, outcome | light, adjusted)
+            return joint, True
         for key, matched in fewer.items():
-            result, fit = outcome[key], good.pop(key)
+            result, fit = results[key], fits.pop(key)
             counts = {"matched": matched, "alone": fit.match_count}
             why = make_reason("differs_from_session", fit.model.protocol.vocabulary, **counts)
             own = result.alone or result.quantities
-            outcome[key] = replace(result, reasons=(*result.reasons, why), quantities=own)
-    return FittedTogether(None, outcome, good)
+            results[key] = replace(result, reasons=(*result.reasons, why), quantities=own)
+    return None, True
 
 
 def _joint_result(result: DropResult, drop: JointDrop, budgets: Budgets) -> DropResult:

@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from statistics import fmean, stdev
-from typing import Any, TypeVar
+from typing import Any
 
-from rig.analysis.averages import mean
+from rig.analysis.averages import by_case, mean
+from rig.analysis.budget_lines import COMMON
 from rig.analysis.comparison import Comparison, Difference, compare
 from rig.analysis.gate_passages import GatePassage
-from rig.analysis.plain_data import attributes
-from rig.analysis.quantities import COMMON
-from rig.analysis.result import GOOD, DropResult, Measured
+from rig.analysis.plain_data import Record, attributes, spread
+from rig.analysis.result import DropResult, Measured, good_runs
 from rig.measurands import MEASURANDS, averaged
 from rig.predictions import predicted_run
-from rig.protocol.protocol import Condition, Protocol, Run
+from rig.protocol.protocol import Condition, Protocol
 from rig.units import Quantity
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
-class GateMeans:
+class GateMeans(Record):
     """Mean passage of an object through a gate, over all runs in which the gate saw it.
 
     Attributes
@@ -36,15 +34,12 @@ class GateMeans:
         Standard deviations between runs, m/s and s; `None` for a single one.
     """
 
+    MEMBERS = "*mean speed_sd_m_s=speed_sd? interval_sd_s=interval_sd? n"
+
     mean: GatePassage
     n: int
     speed_sd: float | None
     interval_sd: float | None
-
-    def json(self) -> dict[str, Any]:
-        """Return a member of ``gates`` of the summary."""
-        scatter = {"speed_sd_m_s": self.speed_sd, "interval_sd_s": self.interval_sd, "n": self.n}
-        return self.mean.json() | {name: sd for name, sd in scatter.items() if sd is not None}
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,64 +85,41 @@ class Incline:
         """Return a member of ``summary``."""
         fields: dict[str, Any] = {**self.condition.json(), "n": self.n}
         for name, value in self.means.items():
-            fields[name] = value.json()
+            fields[name], row = value.json(), MEASURANDS[name]
             if name in self.deviations:
-                fields[MEASURANDS[name].key("sd")] = self.deviations[name]
-                fields[MEASURANDS[name].key("se")] = self.deviations[name] / math.sqrt(self.n)
-        fields["common"] = [
-            {"name": cause, "quantity": name, "u": u}
-            for name, causes in self.causes.items()
-            for cause, u in causes.items()
-        ]
-        fields |= attributes(self, "gates") if self.gates else {}
+                fields[row.key("sd")] = self.deviations[name]
+                fields[row.key("se")] = self.deviations[name] / math.sqrt(self.n)
+        fields |= {"common": spread(self.causes)} | attributes(self, "gates?")
         fields["predicted"] = {name: model.value for name, model in self.predicted.items()}
         fields["predicted_u"] = {name: model.u for name, model in self.predicted.items()}
-        main, *further = self.means
-        stems = {main: ""} | {name: f"_{MEASURANDS[name].stem}" for name in further}
-        errors = {f"normalized_error{stem}": name for name, stem in stems.items()}
-        return fields | {key: self.normalized_error(name) for key, name in errors.items()}
+        for number, name in enumerate(self.means):
+            stem = f"_{MEASURANDS[name].stem}" if number else ""
+            fields[f"normalized_error{stem}"] = self.normalized_error(name)
+        return fields
 
 
 def summarize(
     protocol: Protocol, results: Iterable[DropResult], *, rejected: bool = False
-) -> list[Incline]:
+) -> tuple[Incline, ...]:
     """Average the good runs of each incline and, if chains differ, of each striking chain.
 
     Parameters
     ----------
     rejected
-        Whether to include runs that are good by their limits but were rejected by the operator.
+        As for `rig.analysis.result.good_runs`.
     """
-    cases = good_cases(protocol, results, rejected=rejected)
-    compared = compare(protocol, cases)
-    return [_incline(protocol, runs, compared) for runs in cases]
-
-
-def good_cases(
-    protocol: Protocol, results: Iterable[DropResult], *, rejected: bool = False
-) -> list[list[DropResult]]:
-    """Return the good runs of each condition; `rejected` as in `summarize`."""
-    good = [
-        result
-        for result in results
-        if result.verdict in GOOD or (rejected and result.limits in GOOD)
-    ]
-    return by_case(protocol, good, lambda member: member.run)
-
-
-def by_case(protocol: Protocol, members: Iterable[T], run_of: Callable[[T], Run]) -> list[list[T]]:
-    """Group members by incline and, if chains differ, by striking chain, in order."""
-    groups: dict[Condition, list[T]] = {}
-    for member in members:
-        groups.setdefault(protocol.condition(run_of(member)), []).append(member)
-    return [group for _, group in sorted(groups.items())]
+    good = good_runs(results, rejected=rejected)
+    compared, cases = compare(protocol, good), by_case(protocol, good)
+    return tuple(_incline(protocol, at, runs, compared) for at, runs in cases.items())
 
 
 def _incline(
-    protocol: Protocol, results: Sequence[DropResult], compared: Iterable[Comparison]
+    protocol: Protocol,
+    condition: Condition,
+    results: Sequence[DropResult],
+    compared: Iterable[Comparison],
 ) -> Incline:
     run = results[0].run
-    condition = protocol.condition(run)
     names = [row.name for row in averaged() if row.name in results[0].quantities]
     values = {name: [result.quantities[name] for result in results] for name in names}
     differences = {

@@ -17,14 +17,13 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from rig.analysis.air import lags, prior_air, slack
 from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import Components, above
-from rig.analysis.discrepancy import MODES
+from rig.analysis.departures import MODES, drawn, lags, lever, slack, swing_sd
 from rig.analysis.equations import ExpectedEdges, standardise
-from rig.analysis.swing import drawn, lever, swing_sd
 from rig.analysis.trajectory import COMMON, DRAG, GRAVITY, RELEASE, START
 from rig.arrays import Array, Flags, Index
+from rig.predictions import air_of
 from rig.protocol.protocol import Gates, Protocol
 
 if TYPE_CHECKING:
@@ -133,6 +132,14 @@ class Unknown:
         scale = float(getattr(side.model.components, self.scale)) if self.scale else 1.0
         prior: Array = scale * np.atleast_1d(sd)
         return prior
+
+
+def prior_air(protocol: Protocol) -> tuple[float, float]:
+    """Return the prior mean and standard uncertainty of κ of the first chain as a whole, 1/m."""
+    if protocol.drag is None:
+        return 0.0, protocol.priors.drag
+    kappa = air_of(protocol, next(iter(protocol.chains)))[0]
+    return kappa, kappa * protocol.drag.relative_u
 
 
 def _by_gate(side: Side) -> Array:

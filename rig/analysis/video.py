@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from rig.analysis.plain_data import Record
 from rig.analysis.result import Measured
 from rig.arrays import Array
 
@@ -16,7 +16,7 @@ _ENOUGH = 8  # least number of frames for that correlation
 
 
 @dataclass(frozen=True, slots=True)
-class VideoFall:
+class VideoFall(Record):
     """Acceleration by a video.
 
     Attributes
@@ -27,30 +27,34 @@ class VideoFall:
         Number of frames.
     bent
         Whether the frames depart from a parabola by more than chance.
+    gates
+        Acceleration by the gates, if they measured it.
     """
+
+    MEMBERS = "acceleration_m_s2=acceleration frames bent normalized_error?"
 
     acceleration: Measured
     frames: int
     bent: bool
+    gates: Measured | None
 
-    def beside(self, gates: Measured) -> float:
-        """Return E_n of the video's acceleration less that of the gates; within ±1 both agree."""
-        return self.acceleration.less(gates).normalized_error or 0.0
-
-    def json(self, gates: Measured | None) -> dict[str, Any]:
-        """Return ``video`` of the results."""
-        fields: dict[str, Any] = {"acceleration_m_s2": self.acceleration.json()}
-        fields |= {"frames": self.frames, "bent": self.bent}
-        return fields if gates is None else fields | {"normalized_error": self.beside(gates)}
+    @property
+    def normalized_error(self) -> float | None:
+        """E_n of the video's acceleration less that of the gates; within ±1 both agree."""
+        if self.gates is None:
+            return None
+        return self.acceleration.less(self.gates).normalized_error or 0.0
 
 
-def video_fall(times: Array, x: Array, y: Array) -> VideoFall:
+def video_fall(times: Array, x: Array, y: Array, gates: Measured | None = None) -> VideoFall:
     """Fit parabolas to both coordinates; direction and origin do not matter.
 
     Parameters
     ----------
     times, x, y
         s and m, shape ``(frames,)``, at least 4 frames.
+    gates
+        As in `VideoFall`.
     """
     design = np.vander(times - times.mean(), 3)  # centred, for numerical accuracy
     basis, triangle = np.linalg.qr(design)
@@ -67,4 +71,4 @@ def video_fall(times: Array, x: Array, y: Array) -> VideoFall:
     total = float(off @ off)
     neighbours = float(off[1:] @ off[:-1]) / total if total else 0.0
     bent = times.size >= _ENOUGH and neighbours > _BENT
-    return VideoFall(Measured(size, u, float(degrees)), int(times.size), bent)
+    return VideoFall(Measured(size, u, float(degrees)), int(times.size), bent, gates)

@@ -19,7 +19,7 @@ from rig import __version__
 from rig.bundle.archive import CRATE, SUMS, seal, to_json
 from rig.bundle.means import mean_tables
 from rig.bundle.tables import csv_files, data_package
-from rig.results import SessionResults, protocol_of
+from rig.results.whole import SessionResults, protocol_of
 from rig.session.faults import translate_errors
 from rig.session.reading import Reader
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 from rig.cache.plain import from_text, to_text
-from rig.cache.store import CacheFile
+from rig.cache.store import CacheFolder
 
 Kept = TypeVar("Kept")
 
@@ -39,7 +39,7 @@ class CacheEntry(Generic[Kept]):
         program = "" if None in content else _program()
         self._key = program and f"{program} {hashlib.sha256(parts).hexdigest()}"
         self._fresh = fresh
-        self._file = CacheFile()
+        self._file = CacheFolder()
 
     def find(self) -> Kept | None:
         """Return a kept result; `None` where there is none."""

@@ -1,35 +1,26 @@
-"""One SQLite file of texts by key in the user's cache folder, and never beside a record.
+"""Texts by key in the user's cache folder, a file each, and never beside a record.
 
-Nothing rests on it: where it cannot be read, written or trusted it is as if it were empty. SQLite
-lets several processes use it at once, and an entry that a killed process began is not there.
+Nothing rests on it: what cannot be read, written or trusted is as if it were not there. A file
+takes its place whole, so several processes may use the cache at once, and what a killed process
+began is no entry.
 """
 
 from __future__ import annotations
 
 import os
-import sqlite3
-import stat
+import shutil
 import zlib
-from collections.abc import Callable
-from contextlib import closing, suppress
+from contextlib import suppress
+from hashlib import sha256
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import platformdirs
 
-Answer = TypeVar("Answer")
-
-_MOST_BYTES = 256 << 20
-"""A session of 108 runs takes 2 MB of it."""
-_BUSY_S = 1.0
-_UNUSABLE = {
-    sqlite3.SQLITE_CORRUPT,
-    sqlite3.SQLITE_NOTADB,
-    sqlite3.SQLITE_ERROR,
-    sqlite3.SQLITE_FULL,
-}
-"""What SQLite says of a file that is damaged, that has other tables than these, or that is full."""
-_CREATE = "CREATE TABLE IF NOT EXISTS entry (key TEXT PRIMARY KEY, packed BLOB NOT NULL) STRICT"
+_MOST_BYTES = 512 << 20
+"""A session of 108 runs takes 2 MB of it; a single entry may take a sixteenth."""
+_PARTS = 16
+"""Folders that share it, by a key's first digit: for room in one, no other is looked through."""
 
 
 class CacheSize(NamedTuple):
@@ -39,7 +30,7 @@ class CacheSize(NamedTuple):
     used_bytes: int
 
 
-class CacheFile:
+class CacheFolder:
     """The cache of this user, or one in another folder.
 
     Parameters
@@ -47,74 +38,65 @@ class CacheFile:
     folder
         Made when it is first used, for this user alone; by default where the platform has caches.
     most_bytes
-        What the file may take; where an entry has no more room, all others are forgotten for it.
+        What its files may take; where an entry has no more room, a part of the others is forgotten.
     """
 
     def __init__(self, folder: Path | None = None, most_bytes: int = _MOST_BYTES) -> None:
         self.folder = platformdirs.user_cache_path("chainrig") if folder is None else folder
-        self._path = self.folder / "results.sqlite"
-        self._most_bytes = most_bytes
+        self._most_bytes = most_bytes // _PARTS  # in each of them
 
     def get(self, key: str) -> str | None:
         """Return the text of a key; `None` where there is none."""
-
-        def read(connection: sqlite3.Connection) -> str | None:
-            row = connection.execute("SELECT packed FROM entry WHERE key = ?", [key]).fetchone()
-            # What was altered fails the checksum of its compression.
-            return row and zlib.decompress(row[0]).decode("utf-8", "surrogatepass")
-
-        return self._transact(read)
+        # What was altered, or written by halves, fails the checksum of its compression.
+        with suppress(OSError, ValueError, zlib.error):
+            return zlib.decompress(self._file(key).read_bytes()).decode("utf-8", "surrogatepass")
+        return None
 
     def put(self, key: str, text: str) -> None:
         """Keep a text, if that is possible."""
         packed = zlib.compress(text.encode("utf-8", "surrogatepass"), 1)
-        insert = "INSERT OR REPLACE INTO entry VALUES (?, ?)"
-        self._transact(lambda connection: connection.execute(insert, (key, packed)))
+        if len(packed) > self._most_bytes:
+            return
+        with suppress(OSError):
+            file = self._file(key)
+            file.parent.mkdir(exist_ok=True)
+            with os.scandir(file.parent) as beside:
+                used = sum(entry.stat().st_size for entry in beside)
+            if used + len(packed) > self._most_bytes:
+                shutil.rmtree(file.parent)
+                file.parent.mkdir()
+            begun = file.with_suffix(f".{os.getpid()}")
+            begun.write_bytes(packed)
+            begun.replace(file)
 
     def size(self) -> CacheSize | None:
         """Return how much is kept; `None` where no cache can be used."""
-
-        def count(connection: sqlite3.Connection) -> CacheSize:
-            rows = "SELECT count(*), coalesce(sum(length(packed)), 0) FROM entry"
-            return CacheSize(*connection.execute(rows).fetchone())
-
-        return self._transact(count)
+        with suppress(OSError):
+            sizes = [file.stat().st_size for file in self._private_folder().glob("*/*")]
+            return CacheSize(len(sizes), sum(sizes))
+        return None
 
     def clear(self) -> None:
         """Forget everything."""
         with suppress(OSError):
-            self._path.unlink()
-            self._path.with_name(f"{self._path.name}-journal").unlink()
+            shutil.rmtree(self._private_folder())
 
-    def _transact(self, use: Callable[[sqlite3.Connection], Answer]) -> Answer | None:
-        """Use the file in one transaction; begin a new file where it is damaged."""
-        for _ in range(2):
-            try:
-                self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-                if not _is_private(self.folder):
-                    return None
-                connection = sqlite3.connect(self._path, timeout=_BUSY_S)
-                with closing(connection), connection:
-                    # A crash of the computer may lose the file; that of a program loses nothing.
-                    connection.execute("PRAGMA synchronous = OFF")
-                    connection.execute(_CREATE)
-                    (page_bytes,) = connection.execute("PRAGMA page_size").fetchone()
-                    pages = self._most_bytes // page_bytes
-                    connection.execute(f"PRAGMA max_page_count = {pages}")
-                    return use(connection)
-            except sqlite3.Error as error:
-                # Else another process has it for long, or there is no room.
-                if error.sqlite_errorcode & 0xFF not in _UNUSABLE:
-                    return None
-                self.clear()
-            except (OSError, ValueError, zlib.error):
-                return None
-        return None
+    def _file(self, key: str) -> Path:
+        name = sha256(key.encode()).hexdigest()
+        return self._private_folder() / name[0] / name
 
+    def _private_folder(self) -> Path:
+        """Return the folder, made where it was missing.
 
-def _is_private(folder: Path) -> bool:
-    """Whether nobody else can write in a folder."""
-    about = folder.stat()
-    if not folder.is_absolute() or not stat.S_ISDIR(about.st_mode):
-        return False
-    return not hasattr(os, "getuid") or (about.st_uid == os.getuid() and not about.st_mode & 0o022)
+        Raises
+        ------
+        OSError
+            It cannot be made, or others can write in it.
+        """
+        if not self.folder.is_absolute():
+            raise FileNotFoundError(self.folder)
+        self.folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        about = self.folder.stat()
+        if hasattr(os, "getuid") and (about.st_uid != os.getuid() or about.st_mode & 0o022):
+            raise PermissionError(self.folder)
+        return self.folder

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
 
 from rig.protocol.protocol import Run
-from rig.reasons import Reason
+from rig.recorder.run_lines import RunLine
 from rig.records import Job
-from rig.session.reading import StateEntry
 
 ATTEMPTS = 3
 """How often a void run is made before it stays void."""
@@ -17,32 +15,6 @@ CLOCK_U = 1e-4
 """How well the device's clock must be known before a drop, relative: a resonator that is off by
 0.13 % spreads a chain's edges over the wrong rods."""
 CLOCK_S = 2.0  # of clock samples are plenty for that
-
-
-class RunLine(NamedTuple):
-    """Where one planned run stands."""
-
-    run: int
-    incline_deg: float
-    impact: str | None
-    free: str | None
-    attempt: int = 0
-    state: str = "planned"
-    reasons: tuple[Reason, ...] = ()
-
-    @property
-    def again(self) -> Job:
-        """Another attempt, whatever became of the latest one."""
-        return Job(self.run, self.attempt + 1)
-
-
-def plan_lines(planned: Iterable[Run], log: Iterable[StateEntry]) -> list[RunLine]:
-    """Say where each planned run stands by the log of a session."""
-    last = {entry.run: (entry.attempt, entry.state, entry.reasons) for entry in log}
-    return [
-        RunLine(run.number, run.incline_deg, run.impact, run.free, *last.get(run.number, ()))
-        for run in planned
-    ]
 
 
 def next_job(runs: Iterable[RunLine], voids: Mapping[int, int]) -> Job | None:

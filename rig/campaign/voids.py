@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from rig.campaign.plan import RunLine
 from rig.reasons import Reason, make_reason, remedies, summarize_reasons
+from rig.recorder.run_lines import RunLine
 from rig.records import Job
 from rig.session.reading import StateEntry
 

@@ -42,10 +42,10 @@ def attach(arguments: Arguments) -> None:
 
 def unblind(arguments: Arguments) -> None:
     """Record that a blind session's numbers may be seen from now on."""
-    from rig.results import kept_back, protocol_of  # noqa: PLC0415 - notes and files need no numpy
+    from rig.results.whole import kept_back  # noqa: PLC0415 - notes and files need no numpy
 
     with Session.open(arguments.session) as session:
-        if not kept_back(session, protocol_of(session)):
+        if not kept_back(session):
             when = f"since {session.unblinded}" if session.unblinded else "and never was blind"
             raise rig_error("session_open", path=arguments.session, when=when)
         session.unblind()

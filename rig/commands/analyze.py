@@ -9,7 +9,7 @@ from rig.commands.output import Arguments, print_results, progress, show, tell_d
 from rig.measurands import acceleration_in
 from rig.report.parts import scatter_parts, tables
 from rig.report.templates import lines
-from rig.results import SessionResults, complete_analysis, results
+from rig.results.whole import SessionResults, complete_analysis, results
 from rig.session.store import Session
 from rig.timers.video import read_video
 
@@ -31,10 +31,10 @@ def main(arguments: Arguments) -> int:
         members: dict[str, Any] = {}
         if arguments.priors:
             members["prior_sensitivity"] = _sensitivity(session, outcome, fresh=arguments.fresh)
-    video = None if track is None or outcome.blind else video_fall(*track)
-    gates = _by_gates(outcome)
+    shown = None if outcome.blind else track
+    video = shown and video_fall(*shown, _by_gates(outcome))
     if video is not None:
-        members["video"] = video.json(gates)
+        members["video"] = video.json()
     code = print_results(outcome, as_json=arguments.json, **members)
     if not arguments.json:
         summary = outcome.analysis.summary
@@ -45,7 +45,7 @@ def main(arguments: Arguments) -> int:
         for part in asked:
             show(["", part.heading, *part.table])
         if video is not None:
-            show(["", *lines("video", video, gates)])
+            show(["", *lines("video", video)])
     return code
 
 

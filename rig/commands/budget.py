@@ -5,16 +5,14 @@ from typing import Any
 
 from rig.analysis import monte_carlo
 from rig.analysis.distributions import coverage_factor
-from rig.analysis.drop import DropCase
 from rig.analysis.result import Measured
-from rig.analysis.session import planned_run
+from rig.analysis.session import drop_case
 from rig.cache.entry import recall
 from rig.commands.output import Arguments, print_data
-from rig.protocol.plan import runs
 from rig.reasons import rig_error, sentences
 from rig.report.numbers import ranges
 from rig.report.templates import sentence
-from rig.results import SessionResults, calibration, check_open, protocol_of
+from rig.results.whole import SessionResults, calibration, check_open, protocol_of
 from rig.session.reading import Reader
 
 SEED = 1
@@ -52,9 +50,8 @@ def budget(
         recorded = ranges("run", (result.run.number for result in outcome.analysis.runs))
         raise rig_error("run_unrecorded", path=session.path, run=number, runs=recorded)
     protocol = protocol_of(session)
-    check_open(session, protocol)
-    planned = planned_run({run.number: run for run in runs(protocol)}, drop)
-    single, fit = DropCase(protocol, planned, drop, calibration(session).scale(drop)).read()
+    check_open(session)
+    single, fit = drop_case(protocol, drop, calibration(session).scale(drop)).read()
     if fit is None:
         raise rig_error("run_void", run=number, text=sentences(single.reasons))
     result = next(result for result in outcome.analysis.runs if result.run.number == number)

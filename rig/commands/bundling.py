@@ -18,7 +18,7 @@ from rig.recover.examine import FAULTS, ExaminedFile, describe, examine
 from rig.report.canvas import figure_file
 from rig.report.finding import deviations
 from rig.report.templates import lines
-from rig.results import protocol_of, results
+from rig.results.whole import protocol_of, results
 from rig.session.hashes import protocol_first
 from rig.session.reading import Reader
 from rig.session.store import Session

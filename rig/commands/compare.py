@@ -2,7 +2,7 @@
 
 from contextlib import ExitStack
 
-from rig.commands.output import VOID, Arguments, print_data, progress, say
+from rig.commands.output import Arguments, exit_code, print_data, progress, say
 from rig.files import write_atomic
 from rig.report import comparison
 from rig.report.canvas import write_figure
@@ -27,7 +27,7 @@ def analyze_together(arguments: Arguments) -> int:
     """Print the results of several sessions in one joint fit, as ``rig analyze A B`` does."""
     together = read_together(arguments)
     print_data(together.json(), comparison.pooled_lines(together), as_json=arguments.json)
-    return VOID if together.void else 0
+    return max(exit_code(analysis) for _, analysis in together.analyses())
 
 
 def read_together(arguments: Arguments) -> TogetherResults:

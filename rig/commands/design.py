@@ -46,7 +46,7 @@ def main(arguments: Arguments) -> None:
 
 def _read_scatter(path: str, protocol: Protocol) -> Components:
     """Return the scatter of an earlier session of the same rig."""
-    from rig.results import complete_analysis, protocol_of  # noqa: PLC0415 - only with --learned
+    from rig.results.whole import complete_analysis, protocol_of  # noqa: PLC0415 - only with --learned
     from rig.session.store import Session  # noqa: PLC0415
 
     with Session.open(path, readonly=True) as session:

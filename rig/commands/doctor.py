@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
-from rig.cache.store import CacheFile
+from rig.cache.store import CacheFolder
 from rig.commands.output import Arguments, print_findings, say
 from rig.doctor import computer
 from rig.doctor.board import BOARD_CHECKS
@@ -20,7 +20,7 @@ from rig.usb.listing import serial_ports
 def main(arguments: Arguments) -> int:
     """Say what is well, and of what is not, what to do."""
     if arguments.clear_cache:
-        CacheFile().clear()
+        CacheFolder().clear()
     checks = _findings(arguments.port, arguments.session)
     troubles = print_findings("findings", checks, as_json=arguments.json)
     things = f"{troubles} thing{'s' * (troubles > 1)}" if troubles else "nothing"
@@ -43,7 +43,7 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
     elif url:
         yield Finding("board", "its port cannot be used now", Verdict.NOT_POSSIBLE)
     yield make_check("packages", computer.check_packages, "chainrig")
-    yield make_check("kept results", computer.describe_cache, CacheFile())
+    yield make_check("kept results", computer.describe_cache, CacheFolder())
     yield make_check("disk", computer.check_room, Path(session or "").parent)
     if session:
         yield from check_session(session)

@@ -7,8 +7,8 @@ from rig.files import make_folder
 from rig.report.canvas import write_figure
 from rig.report.estimate import estimate_text
 from rig.report.estimate_figures import estimate_pictures
-from rig.results import check_open, protocol_of, results
 from rig.results.estimated import session_estimate
+from rig.results.whole import check_open, results
 from rig.sections import Sections
 from rig.session.store import Session
 
@@ -17,7 +17,7 @@ def main(arguments: Arguments) -> int:
     """Estimate the parameters of the impacts from a session."""
     with Session.open(arguments.session, readonly=True) as session:
         folder = None if arguments.output is None else make_folder(arguments.output)
-        check_open(session, protocol_of(session))
+        check_open(session)
         fresh = arguments.fresh
         outcome = results(session, progress, fresh=fresh)
         estimate = session_estimate(session, outcome, progress, fresh=fresh)

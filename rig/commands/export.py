@@ -3,7 +3,7 @@
 from rig.bundle.tables import csv_files
 from rig.commands.output import Arguments, progress, say, tell_damage
 from rig.files import make_folder, write_atomic
-from rig.results import results
+from rig.results.whole import results
 from rig.session.store import Session
 
 

@@ -119,8 +119,7 @@ def _check_plan(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:
     planned = len(runs(protocol))
     strangers = sorted({drop.run for drop in drops if drop.run > planned})
     if strangers:
-        values = {"run": strangers[0], "protocol": protocol.source, "planned": planned}
-        raise refusal(source, "run_unplanned", **values)
+        raise refusal(source, "run_not_planned", run=strangers[0], planned=planned)
     edges = (edge for drop in drops for edge in drop.edges)
     if idle := sorted({edge.channel for edge in edges if not gates.mask >> edge.channel & 1}):
         say(make_reason("channels_unused", channels=", ".join(map(str, idle))).text)

@@ -15,7 +15,6 @@ from rig.protocol import reader
 from rig.protocol.describe import describe
 from rig.protocol.draft import SCENES, Draft, Scene, draft_text
 from rig.protocol.measurable import check_recordable
-from rig.ready import WIRED
 from rig.reasons import rig_error
 from rig.report.canvas import figure_file
 from rig.report.mounting import mounting_figure
@@ -42,7 +41,7 @@ def main(arguments: Arguments) -> int:
     assert protocol.gates is not None
     texts: dict[str, str | bytes] = {"protocol": text}
     texts["mounting"] = figure_file(mounting_figure(protocol, protocol.gates), "svg")
-    if board in WIRED:
+    if board in BOARDS:
         texts["wiring"] = wiring_drawing(protocol, board)
     with ExitStack() as undo:  # a disk that is full half-way is left as it was
         for word, content in texts.items():

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from rig.analysis.session import Analysis
-    from rig.results import SessionResults
+    from rig.results.whole import SessionResults
     from rig.selftest.findings import Finding
 
 VOID = 3

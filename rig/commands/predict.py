@@ -2,14 +2,12 @@
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
-from rig.analysis.distributions import COVERAGE_95
 from rig.commands.output import Arguments, print_data, say
 from rig.files import write_atomic
-from rig.measurands import SEPARATION, SPEED, Measurand
+from rig.measurands import SEPARATION, SPEED
 from rig.model.prediction import PredictedIncline
-from rig.predictions import group_notes, predictions
+from rig.predictions import group_notes, predictions, quantities
 from rig.protocol import reader
 from rig.protocol.protocol import Protocol
 from rig.report.columns import table_parts
@@ -32,7 +30,7 @@ def _write_table(protocol: Protocol, lines: list[PredictedIncline]) -> list[str]
     """Lay predictions out as text, notes below; without columns of what the scene does not have."""
     struck = protocol.surface is not None
     rows = (SEPARATION, SPEED) if protocol.two_chains else (SPEED,)
-    values = {"values": lambda line: {row.name: _value(line, row) for row in rows}}
+    values = {"values": lambda line: quantities(line, *rows)}
     (part,) = table_parts("predictions" if struck else "fall", lines, derived=values)
     part = replace(part, rows=[[cell or "–" for cell in row] for row in part.rows])
     notes = group_notes(lines)
@@ -40,12 +38,6 @@ def _write_table(protocol: Protocol, lines: list[PredictedIncline]) -> list[str]
         free = dict.fromkeys(fixed(line.free_fall_speed_m_s, 4) for line in lines)
         notes.insert(0, f"free fall: {SPEED.symbol} = {' or '.join(free)} {SPEED.unit}")
     return [*part.table, *notes]
-
-
-def _value(line: PredictedIncline, row: Measurand) -> SimpleNamespace:
-    """Return a prediction with what its own numbers leave open."""
-    u = getattr(line, row.key("u"))
-    return SimpleNamespace(value=getattr(line, row.name), expanded=u and COVERAGE_95 * u)
 
 
 def _write_figure(number: int, path: Path) -> None:

@@ -13,8 +13,8 @@ from rig.report.figure import Chart
 from rig.report.parts import Bars
 from rig.report.session_page import session_page
 from rig.report.templates import page_html
-from rig.results import SessionResults, protocol_of, results
 from rig.results.estimated import session_estimate
+from rig.results.whole import SessionResults, protocol_of, results
 from rig.sections import Sections
 from rig.session.store import Session
 

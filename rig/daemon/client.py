@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import Any, Self
 
 from rig.daemon import rpc
-from rig.daemon.lease import LEASE_S, ControlError
+from rig.daemon.lease import LEASE_S
 from rig.daemon.replica import Replica
 from rig.daemon.socket_path import check_folder
 from rig.errors import RigError
-from rig.reasons import Reason, make_error, rig_error
+from rig.reasons import Reason, rig_error
 from rig.recorder.interrupts import Interrupts
 from rig.records import Drop
 from rig.session.reading import Reader
@@ -213,7 +213,7 @@ class Client:
     def session(self) -> Reader:
         """The open session, for reading."""
         if self._session is None:
-            raise make_error(ControlError, "no_session_open")
+            raise rig_error("no_session_open")
         return self._session
 
     def open_session(
@@ -282,6 +282,8 @@ class AsyncClient:
 
     Attributes
     ----------
+    line
+        As for a `Client`.
     replica
         The state.
     changed
@@ -290,7 +292,7 @@ class AsyncClient:
         Set when the connection has ended.
     """
 
-    _line: Line
+    line: Line
 
     def __init__(self) -> None:
         self.replica = Replica()
@@ -309,7 +311,7 @@ class AsyncClient:
         """
         client = cls()
         notify, end = partial(client._soon, client._follow), partial(client._soon, client._end)
-        client._line = await client._loop.run_in_executor(None, Line, path, name, notify, end)
+        client.line = await client._loop.run_in_executor(None, Line, path, name, notify, end)
         return client
 
     async def call(self, method: str, **params: Any) -> Any:
@@ -320,15 +322,11 @@ class AsyncClient:
         RigError
             As the daemon raised it, or it is gone.
         """
-        return await asyncio.wrap_future(self._line.ask(method, **params))
-
-    async def subscribe(self) -> None:
-        """Follow the state."""
-        await self.call("subscribe")
+        return await asyncio.wrap_future(self.line.ask(method, **params))
 
     async def close(self) -> None:
         """Hang up."""
-        self._line.close()
+        self.line.close()
         self._end()
 
     def _soon(self, do: Callable[..., None], *values: object) -> None:
@@ -386,7 +384,7 @@ def _reach(path: Path) -> socket.socket:
             line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, patience)
             line.connect(str(path))
         except BlockingIOError as error:
-            busy = make_error(rpc.BusyError, "daemon_busy", path=path, patience_s=_REACH_S)
+            busy = rig_error("daemon_busy", path=path, patience_s=_REACH_S)
             raise busy from error
         except OSError as error:
             raise rig_error("no_daemon", path=path, text=error) from error

@@ -8,7 +8,7 @@ from typing import Any, TypeAlias
 
 from rig.daemon import rpc
 from rig.errors import RigError
-from rig.reasons import make_error
+from rig.reasons import rig_error
 
 Message: TypeAlias = rpc.Request | rpc.RpcError
 
@@ -116,7 +116,7 @@ class Connection:
             task.add_done_callback(self._urgent.discard)
         elif self._waiting.full():
             # Refused, not kept back: a stop behind it must be read.
-            busy = make_error(rpc.BusyError, "requests_full", requests=rpc.WAITING_LIMIT)
+            busy = rig_error("requests_full", requests=rpc.WAITING_LIMIT)
             self.send(rpc.failure(message.id, busy))
         else:
             self._waiting.put_nowait(message)

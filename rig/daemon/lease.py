@@ -6,15 +6,10 @@ import threading
 import time
 from collections.abc import Callable
 
-from rig.errors import DeviceError
-from rig.reasons import make_error
+from rig.reasons import rig_error
 
 LEASE_S = 2.0
 """Control lapses when its holder was not heard for so long."""
-
-
-class ControlError(DeviceError):
-    """Another client holds what this one asked for."""
 
 
 class Lease:
@@ -54,7 +49,7 @@ class Lease:
         """
         with self._guard:
             if self._holder not in {None, client} and self._now() < self._until:
-                raise make_error(ControlError, "control_held", holder=self.name)
+                raise rig_error("control_held", holder=self.name)
             self._holder, self.name, self._until = client, name, self._now() + LEASE_S
 
     def heard(self, client: object) -> None:
@@ -87,4 +82,4 @@ class Lease:
         # A request may wait behind a busy disk for longer than a lease: that takes nothing away.
         with self._guard:
             if self._holder is not client:
-                raise make_error(ControlError, "control_needed", holder=self.name or "nobody")
+                raise rig_error("control_needed", holder=self.name or "nobody")

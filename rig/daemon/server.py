@@ -24,7 +24,7 @@ from rig.daemon.socket_path import peer_uid
 from rig.errors import InputError
 from rig.files import make_folder, state_folder
 from rig.ports import is_simulated
-from rig.reasons import make_error, rig_error
+from rig.reasons import rig_error
 from rig.recorder.published import PublishedState
 
 Onlooker = Callable[[PublishedState], Coroutine[Any, Any, None]]
@@ -171,7 +171,7 @@ class Server:
 
     def _hurry(self, connection: Connection) -> None:
         if not connection.is_client:
-            connection.turn_away(make_error(rpc.BusyError, "hello_late", patience_s=HELLO_S))
+            connection.turn_away(rig_error("hello_late", patience_s=HELLO_S))
 
     # ------------------------------------------------------------------ what is looked at
 

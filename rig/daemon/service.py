@@ -19,7 +19,7 @@ from rig.daemon.lease import Lease
 from rig.daemon.publisher import Publisher
 from rig.daemon.worker import Worker
 from rig.printable import encodable, one_line
-from rig.reasons import make_error, plain_reason, read_record, rig_error
+from rig.reasons import plain_reason, read_record, rig_error
 from rig.recorder.controller import Controller
 from rig.recorder.published import PublishedState
 from rig.session.schema import RunState
@@ -73,7 +73,7 @@ class Service:
         if not client.name and request.method != "hello":
             raise rpc.RpcError(rpc.INVALID, "hello comes first")
         if not client.is_client and request.method not in {"hello", "stop"}:
-            raise make_error(rpc.BusyError, "clients_only_stop", clients=CLIENTS)
+            raise rig_error("clients_only_stop", clients=CLIENTS)
         try:
             work = method.bind(request.params)
         except msgspec.ValidationError as error:
@@ -143,7 +143,7 @@ class ApiMethod(NamedTuple):
 def _hello(service: Service, caller: Connection, api: object, client: str) -> dict[str, Any]:
     if isinstance(api, bool) or api != rpc.API:
         versions = {"client": one_line(str(api), 40), "rig": __version__, "daemon": rpc.API}
-        raise make_error(rpc.VersionError, "daemon_version", **versions)
+        raise rig_error("daemon_version", **versions)
     if not caller.name:
         others = sum(connection.is_client for connection in service.connections)
         caller.is_client = others < CLIENTS

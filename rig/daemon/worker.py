@@ -18,14 +18,20 @@ from contextlib import suppress
 from functools import partial
 from typing import Any, NamedTuple
 
-from rig.daemon.lease import ControlError, Lease
+from rig.daemon.lease import Lease
 from rig.daemon.rpc import error_to_data, in_words
-from rig.errors import DeviceError, InputError, RigError, SessionError
+from rig.errors import (
+    ControlError,
+    DeviceError,
+    InputError,
+    RigError,
+    SessionError,
+    StoppedError,
+)
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import is_simulated
-from rig.reasons import Reason, make_error, make_reason, remedies, rig_error
+from rig.reasons import Reason, make_reason, remedies, rig_error
 from rig.recorder.controller import Controller
-from rig.recorder.interrupts import StoppedError
 from rig.recorder.published import PublishedState, link_state
 
 log = logging.getLogger(__name__)
@@ -215,7 +221,7 @@ class Worker:
             self._turn(job)
         self._stops.append(("the daemon ended", Future()))
         self._attend()
-        self._drain(make_error(StoppedError, "daemon_ends"))
+        self._drain(rig_error("daemon_ends"))
         self._trying(self.controller.close)
         self._due_s = math.inf
 
@@ -256,8 +262,8 @@ class Worker:
         is_idle = controller.opened is None and is_simulated(self._url)
         return is_idle or controller.recorder is not None
 
-    def _stop_error(self) -> StoppedError:
-        return make_error(StoppedError, "stopped", text=self._stops[0][0])
+    def _stop_error(self) -> RigError:
+        return rig_error("stopped", text=self._stops[0][0])
 
     def _drain(self, error: RigError) -> None:
         with suppress(queue.Empty):

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rig.analysis.averages import by_case
 from rig.analysis.square_root import Elimination, EquationRows, eliminate, square_root, triangle
-from rig.analysis.summary import by_case
 from rig.arrays import Array, Index
 from rig.design.cases import BEAM, Case
 from rig.estimate.coefficients import KNOWN, coefficients_of, held_back
@@ -122,8 +122,7 @@ def forecast(
     inverse = np.linalg.inv(square_root(rows, np.ones(size), np.zeros(size)).matrix)
     single: dict[str, dict[Condition, float]] = {}
     mean: dict[str, dict[Condition, float]] = {}
-    for group in by_case(protocol, drops, lambda drop: drop[0].run):
-        at = protocol.condition(group[0][0].run)
+    for at, group in by_case(protocol, drops, lambda drop: drop[0].run).items():
         n = sum(case.count for case, _, _ in group)
         gradients = group[0][0].gradients
         for name in (name for name in gradients if name in (names or gradients)):

@@ -9,12 +9,11 @@ import cmath
 from collections.abc import Mapping, Sequence
 from math import tau
 
-from rig.errors import DeviceError
 from rig.flash.boards import UNSEEN
 from rig.flash.image import shipped_firmware
 from rig.link.messages import RefusalReason
 from rig.link.refusals import DeviceRefusedError
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.selftest import checks, line_checks
 from rig.selftest.board import BoardUnderTest, Check, RecordedDrop
 from rig.selftest.findings import fail_if, need
@@ -79,8 +78,7 @@ def _record(board: BoardUnderTest) -> RecordedDrop:
                 raise
         else:
             return board.collect_drop()
-    listed = "too often to begin a recording"
-    raise make_error(DeviceError, "gates_flicker", gates_listed=listed)
+    raise rig_error("gates_flicker", gates_listed="too often to begin a recording")
 
 
 def mains_ripple(times_s: Sequence[float]) -> int | None:

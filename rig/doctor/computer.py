@@ -13,7 +13,7 @@ from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, packages_distributions, requires, version
 from pathlib import Path
 
-from rig.cache.store import CacheFile
+from rig.cache.store import CacheFolder
 from rig.selftest.findings import fail_if
 
 ROOM = 200 * 10**6
@@ -92,7 +92,7 @@ def check_packages(owner: str) -> str:
     return ", ".join(present)
 
 
-def describe_cache(cache: CacheFile) -> str:
+def describe_cache(cache: CacheFolder) -> str:
     """Say how much room kept results take."""
     folder, size = cache.folder, cache.size()
     if size is None:

@@ -96,7 +96,7 @@ def drop_curves(
     begin = drop.model.trajectory("impact", drop.x).height[:1]
     hanging = adjusted.top("impact", Dual(begin, np.zeros((1, drop.x.size)))).value.item()
     heights = np.linspace(hanging - 1e-6, 0.0, POINTS)
-    lasted = adjusted.hit - adjusted.release("impact")
+    lasted = adjusted.arrival.when - adjusted.release("impact")
     times = np.linspace(0.0, float(lasted.value), POINTS)
     struck, separation = model_fall(protocol, run, "impact"), None
     if "free" in drop.model.records:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from rig.analysis.air import prior_air
+from rig.analysis.unknowns import prior_air
 from rig.arrays import Array
 from rig.estimate.hypothesis_fit import Hypothesis, Parameter
 from rig.estimate.quadratic_forms import QuadraticForm

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rig.analysis.averages import by_case
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Measured
-from rig.analysis.summary import by_case
 from rig.arrays import Array
 from rig.estimate.hypotheses import one_alpha, open_alphas, with_nuisances
 from rig.estimate.hypothesis_fit import LikelihoodRatio, fit
@@ -104,8 +104,8 @@ def impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> tuple[Impuls
     tuple of Impulses
         One a condition.
     """
-    cases = by_case(protocol, forms, lambda form: form.run)
-    return tuple(_impulses(protocol, group) for group in cases)
+    cases = by_case(protocol, forms).items()
+    return tuple(_impulses(protocol, condition, group) for condition, group in cases)
 
 
 def resolution(impulses_by_case: Sequence[Impulses]) -> str:
@@ -117,8 +117,7 @@ def resolution(impulses_by_case: Sequence[Impulses]) -> str:
     return f"{make_reason('rods_together', limit=100 * RESOLVED, inclines='; '.join(inclines))}."
 
 
-def _impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> Impulses:
-    condition = protocol.condition(forms[0].run)
+def _impulses(protocol: Protocol, condition: Condition, forms: Sequence[QuadraticForm]) -> Impulses:
     single, open_fit = (
         fit(forms, with_nuisances(alphas, [condition.incline_deg], protocol))
         for alphas in (one_alpha(forms, lambda _: "one"), open_alphas(forms))

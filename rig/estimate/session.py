@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from rig.analysis.air import prior_air
+from rig.analysis.averages import by_case
 from rig.analysis.comparison import Comparison, compare
 from rig.analysis.plain_data import attributes, plain
-from rig.analysis.result import GOOD, Measured
-from rig.analysis.summary import by_case, good_cases
-from rig.analysis.unknowns import SharedUnknowns
+from rig.analysis.result import GOOD, Measured, good_runs
+from rig.analysis.unknowns import SharedUnknowns, prior_air
 from rig.estimate import coefficients as of
 from rig.estimate.alphas import SingleAlphas, single_alphas
 from rig.estimate.curves import DropCurves, drop_curves
@@ -171,11 +170,7 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
     """
     if protocol.surface is None:
         raise rig_error("impacts_absent")
-    good = {
-        (result.run.number, result.attempt): result.run
-        for result in analysis.runs
-        if result.verdict in GOOD
-    }
+    good = {result.job: result.run for result in analysis.runs if result.verdict in GOOD}
     drops = {key: analysis.adjusted[key] for key in good if key in analysis.adjusted}
     if not drops:
         raise rig_error("drops_unfitted" if good else "drops_unusable")
@@ -203,11 +198,11 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
     with sections.alone("The speed gained from each rod"):
         results.impulses = impulses(protocol, groups)
     with sections.alone("The comparison with the model"):
-        results.comparison = compare(protocol, good_cases(protocol, analysis.runs))
+        results.comparison = compare(protocol, good_runs(analysis.runs))
     with sections.alone("The curves"):
         results.curves = tuple(
             drop_curves(protocol, good[key], drops[key], analysis.joint)
-            for key, *_ in by_case(protocol, drops, lambda key: good[key])
+            for key, *_ in by_case(protocol, drops, lambda key: good[key]).values()
         )
     results.failed = tuple(sections.failed.values())
     return results

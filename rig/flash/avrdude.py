@@ -7,11 +7,10 @@ from collections.abc import Callable
 from contextlib import suppress
 from subprocess import DEVNULL, PIPE, STDOUT, Popen, TimeoutExpired
 
-from rig.errors import DeviceError
 from rig.flash.boards import Target
 from rig.flash.image import Image
 from rig.link.port import open_port
-from rig.reasons import make_error, rig_error
+from rig.reasons import rig_error
 
 _LOOK_S = 0.2
 _CAUSES = {
@@ -76,4 +75,4 @@ def write_flash(
         raise rig_error("flash_broke_off", port=port)
     if child.returncode:
         code = next(code for clue, code in _CAUSES.items() if clue in output.lower())
-        raise make_error(DeviceError, code, port=port, exit_code=child.returncode)
+        raise rig_error(code, port=port, exit_code=child.returncode)

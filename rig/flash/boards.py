@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rig.boards import MEGA, PICO, UNO, Capabilities
+from rig.ready import find_resource
 
 UNSEEN = "never seen on hardware: please tell us how it goes (docs/first-board.md)"
 """Said of every board until somebody has: then it becomes an attribute of `Target`."""
@@ -36,6 +37,11 @@ class Target(NamedTuple):
     def image_path(self) -> Path:
         """The firmware that comes with this program."""
         return Path(__file__).with_name(self.image)
+
+    @property
+    def wiring_path(self) -> Path:
+        """The picture (SVG) of the circuits around it that comes with this program."""
+        return find_resource(f"firmware/{self.image_path.stem}/wiring.svg")
 
 
 TARGETS = {

@@ -302,14 +302,8 @@ class Identity(DeviceMessage, code=0x81):
 
     def capabilities(self) -> Capabilities:
         """What this board can do, as it says itself."""
-        return Capabilities(
-            self.board,
-            self.gates,
-            self.releases,
-            self.max_pulse_us / 1e6,
-            self.capacity,
-            bool(self.streams),
-        )
+        pulse_s, streams = self.max_pulse_us / 1e6, bool(self.streams)
+        return Capabilities(self.board, self.gates, self.releases, pulse_s, self.capacity, streams)
 
 
 class Pong(DeviceMessage, code=0x82):

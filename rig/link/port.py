@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import socket
 import warnings
+from pathlib import Path
 from typing import Any, Protocol
 from urllib.parse import urlsplit
 
@@ -12,9 +13,9 @@ import serial
 from serial.urlhandler import protocol_socket
 
 from rig.clock.host import Clock, SystemClock
-from rig.errors import DeviceError, RigError
-from rig.ports import check_name, simulation_package
-from rig.reasons import make_error, rig_error
+from rig.errors import RigError
+from rig.ports import check_name
+from rig.reasons import rig_error
 
 BAUDRATE = 500_000
 """Exact from 16 MHz (UBRR 3 with U2X); 115200 would be 2.1 % off."""
@@ -86,7 +87,7 @@ def open_port(url: str) -> Port:
         below = error.__context__.args[:1] if error.__context__ else ()
         number = error.errno or next((code for code in below if isinstance(code, int)), 0)
         code, text = _CODES.get(number, "port_failed"), _PLAIN.get(number, str(error))
-        raise make_error(DeviceError, code, port=url, text=text) from error
+        raise rig_error(code, port=url, text=text) from error
     except ValueError as error:
         if scheme == "emu":  # pyserial says no more of a handler it cannot import
             raise rig_error("emulator_missing") from error
@@ -110,7 +111,9 @@ def check_url(url: str) -> None:
 
 
 def _add_handlers() -> None:
-    for package in (simulation_package(), "rig_emulator"):  # of sim:// and emu://
+    # Of sim:// and emu://; an installed simulation must not take the name ``sim``.
+    is_installed = (Path(__file__).parents[2] / "rig_sim").is_dir()
+    for package in ("rig_sim" if is_installed else "sim", "rig_emulator"):
         if package not in serial.protocol_handler_packages:
             serial.protocol_handler_packages.append(package)
 

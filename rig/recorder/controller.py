@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from rig.errors import InputError, RigError, SessionError
+from rig.errors import InputError, RigError, StoppedError
 from rig.link.messages import TEST_RUN, Identity, RefusalReason
 from rig.link.port import Port
 from rig.link.refusals import DeviceRefusedError
@@ -15,11 +15,10 @@ from rig.ports import fill_url, is_simulated
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_recordable
 from rig.protocol.protocol import Protocol
-from rig.reasons import Reason, error_of, make_error, make_reason, plain_reason, rig_error
+from rig.reasons import Reason, error_of, make_reason, plain_reason, rig_error
 from rig.recorder import release_test
 from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
-from rig.recorder.interrupts import StoppedError
-from rig.recorder.opening import describe_session, latest_board, latest_states, open_for
+from rig.recorder.opening import describe_session, latest_board, open_for
 from rig.recorder.published import PublishedState, link_state
 from rig.recorder.recorder import NullSink, Recorder
 from rig.records import Drop
@@ -80,7 +79,7 @@ class Controller:
             There is none.
         """
         if self.opened is None:
-            raise make_error(SessionError, "no_session_open")
+            raise rig_error("no_session_open")
         return self.opened
 
     @property
@@ -243,7 +242,7 @@ class Controller:
 
     def _without_drop(self, *states: RunState) -> list[tuple[int, int]]:
         """List the attempts that are logged last in one of these states, with no drop stored."""
-        latest = latest_states(self.session).values()
+        latest = {entry.run: entry for entry in self.session.states()}.values()
         jobs = [(entry.run, entry.attempt) for entry in latest if entry.state in states]
         return [job for job in jobs if self.session.drop(*job) is None]
 

@@ -6,13 +6,9 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from rig.errors import DeviceError
+from rig.ctrl_c import signals_go_to
 
 _PATIENCE = 3
-
-
-class StoppedError(DeviceError):
-    """A client pressed STOP, or the one in control was lost."""
 
 
 class Interrupts:
@@ -31,17 +27,8 @@ class Interrupts:
     @contextmanager
     def caught(self) -> Iterator[None]:
         """Take both signals for the time of a block; only in the main thread."""
-        before = {
-            number: signal.signal(number, self._note)
-            for number in (signal.SIGINT, signal.SIGTERM)
-            # A shell starts what runs in the background with Ctrl-C ignored, and means it.
-            if signal.getsignal(number) is not signal.SIG_IGN
-        }
-        try:
+        with signals_go_to(self._note, signal.SIGINT, signal.SIGTERM):
             yield
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
         self.check()
 
     @contextmanager

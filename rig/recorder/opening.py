@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 from rig.ports import is_simulated, truth_file
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
-from rig.reasons import Reason, reasons_json, rig_error
-from rig.session.reading import Reader, StateEntry
+from rig.reasons import rig_error
+from rig.recorder.run_lines import plan_lines
+from rig.session.reading import Reader
 from rig.session.store import Session
 
 
@@ -26,18 +28,15 @@ def open_for(protocol: Protocol, source: Path, url: str, path: Path) -> Session:
         if simulated:
             truth_file(path).unlink(missing_ok=True)  # of a session that is gone
         return Session.create(path, protocol.text, source.name, simulated=simulated, origin=url)
-    session = Session.open(path)
-    code, values = "", {"path": str(path)}
-    if session.protocol_text != protocol.text:
-        code, values["source"] = "other_protocol", session.protocol_source
-    elif session.simulated != simulated:
-        recorded, kind = (
-            ("simulated", "a real port") if session.simulated else ("real", "a simulation")
-        )
-        code, values = "session_mixed", values | {"recorded": recorded, "port": url, "kind": kind}
-    if code:
-        session.close()
-        raise rig_error(code, **values)
+    with ExitStack() as undo:
+        session = undo.enter_context(Session.open(path))
+        if session.protocol_text != protocol.text:
+            raise rig_error("other_protocol", path=str(path), source=session.protocol_source)
+        if session.simulated != simulated:
+            recorded, kind = ("real", "a simulation") if simulated else ("simulated", "a real port")
+            values = {"path": str(path), "recorded": recorded, "port": url, "kind": kind}
+            raise rig_error("session_mixed", **values)
+        undo.pop_all()
     return session
 
 
@@ -47,30 +46,11 @@ def latest_board(session: Reader) -> dict[str, str]:
     return {name: str(value) for name, value in boards[-1].items()} if boards else {}
 
 
-def latest_states(session: Reader) -> dict[int, StateEntry]:
-    """Return where each run stands that the log names."""
-    return {entry.run: entry for entry in session.states()}
-
-
 def describe_session(
     session: Reader, protocol: Protocol
 ) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Describe a session and its plan as the sections ``session`` and ``runs`` of the state do."""
-    latest = latest_states(session)
-    plan = []
-    for run in runs(protocol):
-        entry = latest.get(run.number)
-        plan.append(
-            {
-                "run": run.number,
-                "incline_deg": run.incline_deg,
-                "impact": run.impact,
-                "free": run.free,
-                "attempt": entry.attempt if entry else 0,
-                "state": str(entry.state) if entry else "planned",
-                **reasons_json(entry.reasons if entry else (), Reason.record),
-            }
-        )
+    plan = [line.json() for line in plan_lines(runs(protocol), session.states())]
     about = {
         "path": str(session.path),
         "source": session.protocol_source,

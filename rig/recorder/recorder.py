@@ -9,7 +9,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from rig.clock.host import HostWatch, SystemClock
-from rig.errors import DeviceError, SessionError
+from rig.errors import DeviceError, SessionError, StoppedError
 from rig.link.client import BOOT_WAIT_S, Device
 from rig.link.messages import Arm, Identity, Phase, pack_label, unpack_label
 from rig.link.port import Port, open_port, port_clock
@@ -18,9 +18,8 @@ from rig.link.transcript import Direction, Record
 from rig.ports import told
 from rig.protocol.measurable import record_ms
 from rig.protocol.protocol import Protocol
-from rig.reasons import Reason, make_error, rig_error, sentences
+from rig.reasons import Reason, rig_error, sentences
 from rig.recorder.feed import StateFeed
-from rig.recorder.interrupts import StoppedError
 from rig.recorder.published import PublishedState
 from rig.records import ClockSample, Drop, Pulse
 from rig.session.schema import RunState
@@ -304,7 +303,7 @@ class Recorder:
             By a client's STOP, or because the one in control was lost.
         """
         if self._halted():
-            raise make_error(StoppedError, "switched_off")
+            raise rig_error("switched_off")
 
     @contextmanager
     def _endable(self) -> Iterator[None]:

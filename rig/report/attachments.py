@@ -10,7 +10,7 @@ from rig.bundle.archive import zip_files
 from rig.bundle.tables import csv_files
 from rig.ready import find_resource
 from rig.records import Drop
-from rig.results import SessionResults
+from rig.results.whole import SessionResults
 from rig.session.reading import Reader
 
 METHOD = "method.md"

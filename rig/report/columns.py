@@ -9,7 +9,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rig.analysis.result import Measured
 from rig.measurands import MEASURANDS, Measurand
 from rig.report.numbers import degrees, fixed, plus_minus
 from rig.text_table import text_table
@@ -171,13 +170,6 @@ def _verdict(error: float | None, *_: object) -> str:
     return "" if error is None else "agrees" if abs(error) <= 1.0 else "disagrees"
 
 
-def _prediction(model: Any, row: Measurand) -> str:
-    """Return the model's value as text; without ± if it is exact."""
-    if model is None or not model.u:
-        return fixed(model and model.value * row.scale, row.decimals)
-    return plus_minus(Measured(model.value, model.u), row.scale)
-
-
 _TABLES = dict(read_tables(Path(__file__).with_suffix(".txt").read_text("utf-8")))
 _WORDS = ("words", "verdict", "quantity", "symbol")
 """Formats of columns without numbers."""
@@ -192,7 +184,6 @@ _WAYS: dict[str, Callable[..., str]] = {
     "p": lambda value, _: "" if value is None else f"{value:.2g}",
     "fixed": lambda value, _, decimals, scale=1.0: fixed(value and value * scale, int(decimals)),
     "fine": lambda value, row: fixed(value and value * row.fine_scale, row.fine_decimals),
-    "predicted": _prediction,
     "plus_minus": lambda value, _, scale=1.0: plus_minus(value, scale),
     "usual": lambda value, row, more=0: plus_minus(value, row.scale, row.decimals + int(more)),
     "small": lambda value, row: plus_minus(value, row.fine_scale, row.fine_decimals),

@@ -19,7 +19,7 @@ from rig.results.together import MeanDifference, TogetherResults
 def shared_lines(results: TogetherResults) -> list[str]:
     """Return lines about the errors that sessions share."""
     owners = defaultdict[str, list[str]](list)
-    for owner, groups in results.fit.shared.items():
+    for owner, groups in results.shared.items():
         for group in (group for group in groups if len(group) > 1):
             owners[", ".join(group)].append(owner)
     return lines("common", owners)
@@ -28,7 +28,7 @@ def shared_lines(results: TogetherResults) -> list[str]:
 def pooled_lines(results: TogetherResults) -> Iterator[str]:
     """Yield the means over all sessions of each scene, as lines of text."""
     yield from ["SIMULATED DATA"] * results.simulated
-    for names, summary in results.fit.pooled.items():
+    for names, summary in results.pooled.items():
         yield from [f"{', '.join(names)}:", *summary_table(summary).splitlines()]
     yield from shared_lines(results)
 
@@ -43,7 +43,7 @@ def difference_lines(results: TogetherResults) -> Iterator[str]:
 
 def comparison_page(results: TogetherResults) -> str:
     """Return the page that `rig compare -o` writes."""
-    title = f"Comparison with {results.fit.parts[0].name}"
+    title = f"Comparison with {results.parts[0].name}"
     page = {"template": "comparison.html", "title": title, "simulated": results.simulated}
     page |= {"chart": draw_comparison(results), "tables": [*_tables(results)]}
     return page_html({**page, "claims": _claims(results)})[0]
@@ -84,7 +84,7 @@ def _tables(results: TogetherResults) -> Iterator[Part]:
     for row, differences in _differences(results):
         means = (
             {"session": part.name, "line": mean.line, "runs": _runs(mean.line)}
-            for part in results.fit.parts
+            for part in results.parts
             for mean in means_of(part.analysis.summary, row)
         )
         yield from table_parts("sessions", means, row=row)
@@ -92,4 +92,4 @@ def _tables(results: TogetherResults) -> Iterator[Part]:
 
 
 def _claims(results: TogetherResults) -> list[str]:
-    return [sentence("less", results.fit.parts[0].name), *shared_lines(results)]
+    return [sentence("less", results.parts[0].name), *shared_lines(results)]

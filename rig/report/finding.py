@@ -16,8 +16,8 @@ from rig.reasons import remedies, summarize_reasons
 from rig.report.numbers import plus_minus
 from rig.report.parts import means_of, summary_incline
 from rig.report.templates import lines, sentence
-from rig.results import SessionResults
 from rig.results.improvements import improvements
+from rig.results.whole import SessionResults
 from rig.session.reading import StateEntry
 from rig.session.schema import RunState
 

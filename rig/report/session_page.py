@@ -24,8 +24,8 @@ from rig.report.falls import fall_figures
 from rig.report.figure import Chart
 from rig.report.numbers import value_of
 from rig.report.parts import Bars
-from rig.results import SessionResults, improvements, protocol_of
-from rig.results.whole import notes
+from rig.results import improvements
+from rig.results.whole import SessionResults, notes, protocol_of
 from rig.sections import Sections
 from rig.session.reading import Reader
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from xml.etree import ElementTree
 
+from rig.flash.boards import TARGETS
 from rig.protocol.protocol import Protocol
-from rig.ready import wiring_picture
 
 _SVG = "http://www.w3.org/2000/svg"
 _OPTIONAL = re.compile(r"gate-\d+|release-\d+|reference|sync|sense")
@@ -20,7 +20,7 @@ def wiring_drawing(protocol: Protocol, board: str) -> str:
     protocol
         The scene.
     board
-        A key of `rig.ready.WIRED`.
+        A key of `rig.flash.boards.TARGETS`.
     """
     gates = protocol.gates.gates if protocol.gates else ()
     words = {
@@ -29,7 +29,7 @@ def wiring_drawing(protocol: Protocol, board: str) -> str:
     used = {*words, f"release-{protocol.release.channel}"}
     for prefix, uri in (("", _SVG), ("xlink", "http://www.w3.org/1999/xlink")):
         ElementTree.register_namespace(prefix, uri)
-    root = ElementTree.fromstring(wiring_picture(board).read_text("utf-8"))  # noqa: S314 - our own
+    root = ElementTree.parse(TARGETS[board].wiring_path).getroot()  # noqa: S314 - our own
     for node in list(root):
         part = node.get("class", "")
         if _OPTIONAL.fullmatch(part) and part not in used:

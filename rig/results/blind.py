@@ -8,46 +8,17 @@ all code that shows results.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from rig.analysis.result import DropResult
 from rig.analysis.session import Analysis
 from rig.measurands import RELEASE_SKEW
-from rig.protocol.protocol import Protocol
-from rig.reasons import rig_error
-from rig.session.reading import Reader
-
-
-def kept_back(session: Reader, protocol: Protocol) -> bool:
-    """Whether a session's results are still withheld."""
-    return protocol.blind and not session.unblinded
-
-
-def check_open(session: Reader, protocol: Protocol) -> None:
-    """Raise an error if a session's results are still withheld.
-
-    Raises
-    ------
-    SessionError
-        The session is blind.
-    """
-    if kept_back(session, protocol):
-        raise rig_error("session_blind", path=str(session.path))
 
 
 def veiled_drop(result: DropResult) -> DropResult:
-    """Return a drop's result without measured values."""
-    shown_names = {RELEASE_SKEW.name} & result.quantities.keys()
-    return replace(
-        result,
-        quantities={name: result.quantities[name] for name in shown_names},
-        rods=(),
-        unmatched=(),
-        last_passages={},
-        gates=(),
-        alone={},
-        gravity=None,
-    )
+    """Return what may be seen of a drop's result: all but measured values."""
+    drop = result.run, result.attempt, result.verdict, result.reasons, result.audit
+    skews = {name: m for name, m in result.quantities.items() if name == RELEASE_SKEW.name}
+    scatter, limits, damaged = result.scatter, result.limits, result.damaged
+    return DropResult(*drop, skews, scatter=scatter, limits=limits, damaged=damaged)
 
 
 def veil(analysis: Analysis) -> Analysis:

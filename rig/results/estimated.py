@@ -23,7 +23,7 @@ def session_estimate(
     results
         Results of the session, with the joint fit if it was made.
     progress, fresh
-        As for `rig.results.results`.
+        As for `rig.results.whole.results`.
 
     Raises
     ------

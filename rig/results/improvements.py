@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from statistics import fmean
-from typing import Any, NamedTuple
 
-from rig.analysis.quantities import BUDGET
+from rig.analysis.budget_lines import BUDGET
+from rig.analysis.plain_data import Record
 from rig.analysis.summary import Incline
 from rig.measurands import Measurand, averaged
 
@@ -20,7 +20,8 @@ _WORTH = 0.9
 """Largest ratio of new to present U at which an improvement is worth naming."""
 
 
-class Improvement(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Improvement(Record):
     """Effect of a better input on the means of a quantity.
 
     Attributes
@@ -33,15 +34,13 @@ class Improvement(NamedTuple):
         Root mean square of U95 over inclines, and its upper bound with the better input, SI.
     """
 
+    MEMBERS = "quantity=measurand.name measure=line times_better U95=now U95_at_most=then"
+
     measurand: Measurand
     line: str
     now: float
     then: float
-
-    def json(self) -> dict[str, Any]:
-        """Return a member of ``measure_next``."""
-        names = {"quantity": self.measurand.name, "measure": self.line, "times_better": _BETTER}
-        return names | {"U95": self.now, "U95_at_most": self.then}
+    times_better: float = _BETTER
 
     @property
     def sentence(self) -> str:

@@ -28,8 +28,8 @@ class KnownDrops:
     """
 
     def __init__(self, protocol: Protocol, *, blind: bool = False, fresh: bool = False) -> None:
-        gates = () if protocol.gates is None else protocol.gates.gates
-        self._content = None if blind else (protocol.text, [gate.channel for gate in gates])
+        gates = protocol.gates
+        self._content = None if blind else (protocol.text, gates and gates.mask)
         self._fresh = fresh
 
     def get(self, drop: Drop) -> DropSummary | None:

@@ -11,21 +11,20 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from statistics import median
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import Any
 
 from rig.analysis.curves import model_curves
-from rig.analysis.drop import DropCase, DropSummary
+from rig.analysis.drop import DropSummary
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.result import GOOD, DropResult
-from rig.analysis.session import Analysis, gather, joins, overrule, planned_run, sum_up
+from rig.analysis.session import Analysis, drop_case, gather, overrule, plan_of, sum_up
 from rig.cache.entry import CacheEntry
 from rig.clock.calibration import Calibration, Calibrator, TimeScale
-from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Protocol, Run
 from rig.records import Drop, Job
-from rig.results.blind import kept_back, veil, veiled_drop
+from rig.results.blind import veil, veiled_drop
 from rig.results.known_drops import KnownDrops
-from rig.results.whole import SessionResults, protocol_of, rejected_drops
+from rig.results.whole import SessionResults, kept_back, protocol_of, rejected_drops
 from rig.session.drop_check import ByteReplay
 from rig.session.reading import Reader, StateEntry
 from rig.session.schema import RunState
@@ -35,8 +34,33 @@ _SAME_SCALE = 5e-6
 """Relative change of the tick rate below which a drop is not analysed again: 50 nm in 10 mm."""
 
 
-@dataclass(frozen=True, slots=True)
-class SessionView:
+@dataclass(frozen=True)
+class _Scene:
+    """A session's protocol with what follows from it.
+
+    Attributes
+    ----------
+    plan
+        Planned runs by number.
+    curves
+        Predictions against inclination from `rig.analysis.curves.model_curves`.
+    blind
+        Whether measured values are withheld.
+    """
+
+    protocol: Protocol
+    plan: Mapping[int, Run]
+    curves: Mapping[str, Any]
+    blind: bool
+
+    @property
+    def kept(self) -> KnownDrops:
+        """Cache of the drops' own summaries."""
+        return KnownDrops(self.protocol, blind=self.blind)
+
+
+@dataclass(frozen=True)
+class SessionView(_Scene):
     """A session as it is on disk, with its results.
 
     Attributes
@@ -49,26 +73,18 @@ class SessionView:
         Analysis of the latest joint fit; before the first, summary of all drops by themselves.
     lagging
         Whether a new joint fit is due, as drops have changed since that of `analysis`.
-    curves
-        Predictions against inclination from `rig.analysis.curves.model_curves`.
-    blind
-        Whether measured values are withheld.
     """
 
     path: Path
     reading: int
-    protocol: Protocol
     simulated: bool
-    plan: Mapping[int, Run]
     drops: Mapping[Job, Drop]
     results: Mapping[Job, DropResult]
     scales: Mapping[Job, TimeScale]
     analysis: Analysis
     lagging: bool
-    curves: Mapping[str, Any]
     clock: Calibration
     states: tuple[StateEntry, ...]
-    blind: bool
 
     @property
     def jobs(self) -> tuple[Job, ...]:
@@ -94,14 +110,9 @@ class SessionView:
         return () if gates is None else tuple(gate.channel for gate in gates.gates)
 
 
-class _Scene(NamedTuple):
-    """Protocol, plan and drop cache; `complete` once the timer's beams are known."""
-
-    protocol: Protocol
-    plan: dict[int, Run]
-    kept: KnownDrops
-    curves: dict[str, Any]
-    complete: bool
+def _scene(session: Reader) -> _Scene:
+    protocol = protocol_of(session)
+    return _Scene(protocol, plan_of(protocol), model_curves(protocol), kept_back(session))
 
 
 @dataclass(slots=True)
@@ -120,10 +131,8 @@ class LiveAnalysis:
     _drops: dict[Job, Drop] = field(default_factory=dict)
     _joint_fit: tuple[object, Analysis | None] = (None, None)
     """The latest joint fit, and its drops with their verdicts and time scales."""
-    _digest: str | None = None
     _calibrator: Calibrator = field(default_factory=Calibrator)
     _replay: ByteReplay = field(default_factory=ByteReplay)
-    _scene: _Scene | None = None
     _readings: int = 0
     _lock: Lock = field(default_factory=Lock)
 
@@ -134,7 +143,7 @@ class LiveAnalysis:
 
     def clock(self, session: Reader) -> Calibration:
         """Return the calibration of the session's clock from all records so far."""
-        return self._calibrator.look(session, self._plan_scene(session).protocol.reference_u)
+        return self._calibrator.look(session, protocol_of(session).reference_u)
 
     def judge(self, session: Reader, drop: Drop) -> DropResult:
         """Return a drop's own result, as `read` does.
@@ -146,9 +155,9 @@ class LiveAnalysis:
         drop
             A drop recorded in it.
         """
-        result = self._summary(drop, self.clock(session).scale(drop)).result
-        protocol = self._plan_scene(session).protocol
-        return veiled_drop(result) if kept_back(session, protocol) else result
+        scene = _scene(session)
+        result = self._summary(scene, drop, self.clock(session).scale(drop)).result
+        return veiled_drop(result) if scene.blind else result
 
     def read(self) -> SessionView:
         """Return the session as it is now; safe in any thread, and serialized.
@@ -160,45 +169,40 @@ class LiveAnalysis:
         """
         with self._lock, Session.open(self.path, readonly=True) as session:
             with session.snapshot():
-                scene, clock = self._plan_scene(session), self.clock(session)
-                states, digest = tuple(session.states()), self._digest
+                scene, clock, digest = _scene(session), self.clock(session), None
+                states = tuple(session.states())
                 if states != self._states:  # records are only added, each with a log entry
-                    checked = session.drops(self._replay)
-                    self._drops = {Job(drop.run, drop.attempt): drop for drop in checked}
+                    self._drops = {drop.job: drop for drop in session.drops(self._replay)}
                     self._states, digest = states, session.digest()
-                causes, blind = rejected_drops(session), kept_back(session, scene.protocol)
-            drops, self._readings = self._drops, self._readings + 1
+            drops, causes = self._drops, rejected_drops(states)
             scales = {job: clock.scale(drop) for job, drop in drops.items()}
             results = {
-                job: overrule(self._summary(drop, scales[job]).result, causes.get(job))
+                job: overrule(self._summary(scene, drop, scales[job]).result, causes)
                 for job, drop in drops.items()
             }
             enough = sum(result.verdict in GOOD for result in results.values()) >= FEWEST
             members = self._members(results)
             # Look for a stored analysis of these records; that of a blind session has no values.
-            if enough and not blind and digest != self._digest and self._joint_fit[0] != members:
+            if digest and enough and not scene.blind and self._joint_fit[0] != members:
                 finished = CacheEntry(SessionResults, digest).find()
                 if finished is not None:
                     self._joint_fit = members, finished.analysis
-                self._digest = digest
+            self._readings += 1
             of, joint = self._joint_fit if enough else (None, None)
             view = SessionView(
+                **vars(scene),
                 path=self.path,
                 reading=self._readings,
-                protocol=scene.protocol,
                 simulated=session.simulated,
-                plan=scene.plan,
                 drops=drops,
                 results=results,
                 scales=scales,
                 analysis=joint or sum_up(scene.protocol, results.values()),
                 lagging=enough and of != members,
-                curves=scene.curves,
                 clock=clock,
                 states=states,
-                blind=blind,
             )
-            return _veiled_view(view) if blind else view
+            return _veiled_view(view) if scene.blind else view
 
     def fit_jointly(self, view: SessionView) -> None:
         """Fit all drops together, as ``rig analyze`` does, for the next `read`.
@@ -210,37 +214,23 @@ class LiveAnalysis:
         view
             Result of `read`.
         """
-        drops = []
-        for job, result in view.results.items():
-            summary, drop = self._summaries[job], view.drops[job]
-            case = DropCase(view.protocol, view.plan[job.run], drop, summary.scale)
-            drops.append(case.restore_drop(summary) if joins(view.protocol, result) else None)
-        analysis = gather(view.protocol, list(view.results.values()), drops)
+        pairs = ((drop, self._summaries[job]) for job, drop in view.drops.items())
+        drops = (
+            (drop_case(view.protocol, drop, summary.scale), summary) for drop, summary in pairs
+        )
+        analysis = gather(view.protocol, drops, rejected_drops(view.states))
         self._joint_fit = self._members(view.results), analysis
 
     def _members(self, results: Mapping[Job, DropResult]) -> object:
         return {job: (drop.verdict, self._summaries[job].scale.hz) for job, drop in results.items()}
 
-    def _plan_scene(self, session: Reader) -> _Scene:
-        scene = self._scene
-        if scene is None or not scene.complete:
-            protocol = protocol_of(session)
-            if scene is None or scene.protocol != protocol:
-                plan = {run.number: run for run in planned_runs(protocol)}
-                drops = KnownDrops(protocol, blind=kept_back(session, protocol))
-                scene = _Scene(protocol, plan, drops, model_curves(protocol), complete=False)
-            self._scene = scene = scene._replace(complete=bool(session.identities()))
-        return scene
-
-    def _summary(self, drop: Drop, scale: TimeScale) -> DropSummary:
+    def _summary(self, scene: _Scene, drop: Drop, scale: TimeScale) -> DropSummary:
         """Return a drop's own summary, from memory, the cache or a new analysis."""
-        scene, job = self._scene, Job(drop.run, drop.attempt)
-        assert scene is not None
-        summary = self._summaries.get(job) or scene.kept.get(drop)
+        summary = self._summaries.get(drop.job) or scene.kept.get(drop)
         if summary is None or abs(summary.scale.hz / scale.hz - 1.0) > _SAME_SCALE:
-            case = DropCase(scene.protocol, planned_run(scene.plan, drop), drop, scale)
+            case = drop_case(scene.protocol, drop, scale)
             summary = scene.kept[drop] = case.summary(summary)
-        self._summaries[job] = summary
+        self._summaries[drop.job] = summary
         return summary
 
 

@@ -5,28 +5,61 @@ Each session counts once; it must be finished, undamaged, unblinded and of the s
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 from typing import Any
 
-from rig.analysis.averages import combine
-from rig.analysis.plain_data import attributes
-from rig.analysis.result import GOOD, DropResult, Measured
-from rig.analysis.session import Analysis, Progress
-from rig.analysis.several import SessionPart, SessionsFit, fit_sessions
-from rig.analysis.summary import Incline, good_cases
+from rig.analysis.averages import by_case, combine
+from rig.analysis.components import priors
+from rig.analysis.plain_data import Record, attributes, plain
+from rig.analysis.result import GOOD, DropResult, Measured, good_runs
+from rig.analysis.session import Analysis, Progress, SessionDrops, fit_sessions
+from rig.analysis.summary import Incline, summarize
 from rig.measurands import averaged
 from rig.protocol.plan import runs as planned_runs
-from rig.protocol.protocol import Condition
+from rig.protocol.protocol import Condition, Protocol
 from rig.reasons import rig_error
-from rig.results.blind import check_open
-from rig.results.whole import SessionResults, complete_analysis, protocol_of, results
+from rig.results.known_drops import edges_digest
+from rig.results.whole import SessionResults, check_open, complete_analysis, protocol_of, results
 from rig.session.reading import Reader
+from rig.threads import one_thread
+
+Shared = Mapping[str, Sequence[Sequence[str]]]
+"""Names of the sessions that share an owner of unknowns, a list for each rig, by the owner."""
+
+
+@dataclass(frozen=True)
+class SessionPart:
+    """A session of a joint fit.
+
+    Attributes
+    ----------
+    name
+        Unique name of the session.
+    own
+        Results of the session by itself.
+    analysis
+        Its analysis with a joint fit.
+    board
+        Unique id of its board; empty if unknown.
+    """
+
+    name: str
+    protocol: Protocol
+    own: SessionResults
+    analysis: Analysis
+    board: str = ""
+
+    @cached_property
+    def cases(self) -> dict[Condition, list[DropResult]]:
+        """Good runs of each condition."""
+        return by_case(self.protocol, good_runs(self.analysis.runs))
 
 
 @dataclass(frozen=True, slots=True)
-class MeanDifference:
+class MeanDifference(Record):
     """A session's mean less that of the reference, which is the first session.
 
     Attributes
@@ -41,17 +74,16 @@ class MeanDifference:
         The difference with its uncertainty.
     """
 
+    MEMBERS = (
+        "session reference *condition quantity *value "
+        "normalized_error=value.normalized_error budget=value.budget"
+    )
+
     quantity: str
     session: str
     reference: str
     condition: Condition
     value: Measured
-
-    def json(self) -> dict[str, Any]:
-        """Return a member of ``differences``."""
-        sessions = attributes(self, "session", "reference")
-        value = self.value.json() | attributes(self.value, "normalized_error", "budget")
-        return sessions | self.condition.json() | {"quantity": self.quantity} | value
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,75 +92,56 @@ class TogetherResults:
 
     Attributes
     ----------
-    sessions
-        Each session's own results, by name, in the order given.
-    fit
-        Joint fit of all sessions.
+    parts
+        The sessions in the order given, with their analysis from the joint fit of all.
+    shared
+        From `same_owners`.
+    pooled
+        Means over all sessions of a scene, by their names.
     """
 
-    sessions: Mapping[str, SessionResults]
-    fit: SessionsFit
+    parts: tuple[SessionPart, ...]
+    shared: Shared
+    pooled: Mapping[tuple[str, ...], Sequence[Incline]]
 
     @property
     def simulated(self) -> bool:
         """Whether any of the sessions is simulated."""
-        return any(session.simulated for session in self.sessions.values())
+        return any(part.own.simulated for part in self.parts)
 
     @property
     def summary(self) -> tuple[Incline, ...]:
         """Means over the runs of all sessions of a scene."""
-        return tuple(line for summary in self.fit.pooled.values() for line in summary)
+        return tuple(line for summary in self.pooled.values() for line in summary)
 
     def analyses(self) -> list[tuple[str, Analysis]]:
         """Return the analysis of each session from the joint fit, by name."""
-        return [(part.name, part.analysis) for part in self.fit.parts]
-
-    @property
-    def void(self) -> bool:
-        """Whether any run is void."""
-        return any(run.verdict == "void" for _, item in self.analyses() for run in item.runs)
+        return [(part.name, part.analysis) for part in self.parts]
 
     def json(self) -> dict[str, Any]:
         """Return the object that ``rig analyze A B --json`` prints."""
-        joint = self.fit.joint
+        rig = self.parts[0].analysis.rig
+        own = ((part.name, attributes(part.own, "simulated", "calibration")) for part in self.parts)
         return {
             "simulated": self.simulated,
-            "sessions": [
-                {"session": name, "simulated": item.simulated, "calibration": item.calibration}
-                for name, item in self.sessions.items()
-            ],
+            "sessions": [{"session": name} | fields for name, fields in own],
             "shared": self._shared_json(),
-            "runs": [
-                {"session": name, **run.json()}
-                for name, analysis in self.analyses()
-                for run in analysis.runs
-            ],
-            "summary": [
-                {"sessions": list(names), **line.json()}
-                for names, summary in self.fit.pooled.items()
-                for line in summary
-            ],
-            **({} if joint is None else {"learned": joint.json()}),
+            "runs": _list("session", ((part.name, part.analysis.runs) for part in self.parts)),
+            "summary": _list("sessions", self.pooled.items()),
+            **(attributes(rig, "learned") if rig else {}),
         }
-
-    def _shared_json(self) -> list[dict[str, Any]]:
-        return [
-            {"what": owner, "sessions": [list(group) for group in groups]}
-            for owner, groups in self.fit.shared.items()
-        ]
 
     def comparison_json(self) -> dict[str, Any]:
         """Return the object that ``rig compare --json`` prints."""
         return {
             "simulated": self.simulated,
             "shared": self._shared_json(),
-            "means": [
-                {"session": part.name, **line.json()}
-                for part in self.fit.parts
-                for line in part.analysis.summary
-            ],
-            "differences": [difference_row.json() for difference_row in self.differences()],
+            "means": _list("session", ((part.name, part.analysis.summary) for part in self.parts)),
+            "differences": plain(self.differences()),
         }
+
+    def _shared_json(self) -> list[dict[str, Any]]:
+        return [{"what": what, "sessions": plain(groups)} for what, groups in self.shared.items()]
 
     def differences(self) -> list[MeanDifference]:
         """Return each session's means less those of the first, for conditions of both.
@@ -141,14 +154,13 @@ class TogetherResults:
         InputError
             No session has runs like those of the first.
         """
-        first, *rest = self.fit.parts
-        reference = _cases(first)
+        first, *rest = self.parts
         differences = []
         for part in rest:
-            for condition, runs in _cases(part).items():
-                alike = [key for key in reference if key.incline_deg == condition.incline_deg]
+            for condition, runs in part.cases.items():
+                alike = [key for key in first.cases if key.incline_deg == condition.incline_deg]
                 same = [key for key in alike if key.impact_chain == condition.impact_chain] or alike
-                pair = runs, reference[same[0]] if len(same) == 1 else []
+                pair = runs, first.cases[same[0]] if len(same) == 1 else []
                 for row in averaged() if pair[1] else ():
                     if all(row.name in run.quantities for member in pair for run in member):
                         values = [[run.quantities[row.name] for run in member] for member in pair]
@@ -160,12 +172,7 @@ class TogetherResults:
         return differences
 
 
-def _cases(part: SessionPart) -> dict[Condition, list[DropResult]]:
-    """Return the good runs of a session, by condition."""
-    cases = good_cases(part.protocol, part.analysis.runs)
-    return {part.protocol.condition(runs[0].run): runs for runs in cases}
-
-
+@one_thread
 def results_together(
     files: Sequence[Reader],
     *,
@@ -174,66 +181,143 @@ def results_together(
     fresh: bool = False,
     progress: Progress | None = None,
 ) -> TogetherResults:
-    """Analyse several sessions in one joint fit.
+    """Analyse several sessions in one joint fit, which starts from each session's own.
 
     Parameters
     ----------
     files
         Open sessions.
     same_rig
-        See `rig.analysis.several.same_owners`.
+        See `same_owners`.
     unfinished
         Whether planned runs may be missing.
     fresh, progress
-        As for `rig.results.results`, for each session in turn.
+        As for `rig.results.whole.results`, for each session in turn.
 
     Raises
     ------
     InputError, SessionError
-        A session cannot be added to the others.
+        A session cannot be added to the others, or the drops fit no common rig.
     """
-    parts: list[SessionPart] = []
-    own: list[SessionResults] = []
-    for name, session in zip(_names(files), files, strict=True):
-        protocol, path = protocol_of(session), str(session.path)
-        check_open(session, protocol)
-        outcome = results(session, progress, fresh=fresh)
-        planned = len(planned_runs(protocol))
-        _check_whole(path, outcome.analysis, planned, unfinished=unfinished)
-        analysis = complete_analysis(session, outcome, progress)
-        boards = [identity.get("unique_id", "") for _, identity in session.identities()]
-        parts.append(SessionPart(name, protocol, analysis, str(boards[-1] if boards else "")))
-        own.append(outcome)
-    _check_repeats(files, own)
-    sessions = dict(zip(_names(files), own, strict=True))
-    return TogetherResults(sessions, fit_sessions(parts, same_rig=same_rig))
-
-
-def _names(files: Sequence[Reader]) -> list[str]:
-    """Return session names: file names, or full paths if file names are not unique."""
     names = [session.path.name for session in files]
-    return names if len(set(names)) == len(names) else [str(session.path) for session in files]
+    names = names if len({*names}) == len(names) else [str(session.path) for session in files]
+    parts = []
+    for name, session in zip(names, files, strict=True):
+        check_open(session)
+        own, protocol = results(session, progress, fresh=fresh), protocol_of(session)
+        _check_whole(session, own.analysis, len(planned_runs(protocol)), unfinished=unfinished)
+        analysis = complete_analysis(session, own, progress)
+        boards = [str(identity.get("unique_id", "")) for _, identity in session.identities()]
+        parts.append(SessionPart(name, protocol, own, analysis, *boards[-1:]))
+    _check_repeats(files)
+    kinds = [(part.protocol.vocabulary.scene, priors(part.protocol)) for part in parts]
+    for name, kind in zip(names, kinds, strict=True):
+        if kind != kinds[0]:
+            raise rig_error("sessions_unlike", path=name, other=names[0])
+    shared = same_owners(parts, same_rig=same_rig)
+    analyses = fit_sessions([_with_owners(part, shared, len(parts)) for part in parts])
+    if any(analysis.unsettled for analysis in analyses):
+        raise rig_error("sessions_disagree", names=", ".join(names))
+    fitted = tuple(
+        replace(part, analysis=analysis) for part, analysis in zip(parts, analyses, strict=True)
+    )
+    return TogetherResults(fitted, shared, _pool_means(fitted))
 
 
-def _check_repeats(files: Sequence[Reader], own: Sequence[SessionResults]) -> None:
+def same_owners(parts: Sequence[SessionPart], *, same_rig: bool | None) -> Shared:
+    """Group sessions by the owners of unknowns that they share.
+
+    Parameters
+    ----------
+    same_rig
+        Whether all sessions have the same rig; if `None`, those with the same protocol title and
+        the same board, if known.
+
+    Returns
+    -------
+    dict
+        For ``rig``, ``posts``, ``beams``, ``start``, ``condition`` and each ``chain NAME`` the
+        names of the sessions that share this owner, a list for each group.
+    """
+    owners: dict[str, dict[tuple[object, str], list[str]]] = {}
+    for place, part in enumerate(parts):
+        by_name = (part.protocol.title, part.board)
+        rig: object = by_name if same_rig is None else same_rig or place
+        for owner, statement in _statements(part.protocol).items():
+            owners.setdefault(owner, {}).setdefault((rig, repr(statement)), []).append(part.name)
+    return {owner: list(groups.values()) for owner, groups in owners.items()}
+
+
+def _statements(protocol: Protocol) -> dict[str, object]:
+    """Return a protocol's statements about the owner of each shared unknown."""
+    gates, chains = protocol.gates, protocol.chains
+    assert gates is not None
+    beams = [(gate.channel, gate.height, gate.side) for gate in gates.gates]
+    scene = (chains, protocol.surface, protocol.contact, protocol.drop)
+    return {
+        "rig": (protocol.gravity, protocol.drag, protocol.track, protocol.reference_u),
+        "posts": (gates.posts, gates.datum_u),
+        "beams": (beams, gates.height_u),
+        "start": protocol.drop,
+        "condition": scene,
+        **{f"chain {name}": chain for name, chain in chains.items()},
+    }
+
+
+def _list(key: str, groups: Iterable[tuple[Any, Iterable[Any]]]) -> list[dict[str, Any]]:
+    """Return the members of all groups as JSON data, each with the name of its group."""
+    return [{key: plain(name)} | plain(member) for name, members in groups for member in members]
+
+
+def _with_owners(part: SessionPart, shared: Shared, count: int) -> SessionDrops:
+    """Return a session's drops, good ones with the name suffixes of their shared unknowns."""
+    owners = {  # unknowns that all sessions share keep their names
+        owner: "" if len(group) == count else f" ({', '.join(group)})"
+        for owner, groups in shared.items()
+        for group in groups
+        if part.name in group
+    }
+    fits = {
+        job: replace(fit, model=fit.model.copy_with(owners=owners))
+        for job, fit in part.analysis.adjusted.items()
+    }
+    return SessionDrops(part.protocol, part.analysis.drops, fits)
+
+
+def _pool_means(parts: Sequence[SessionPart]) -> dict[tuple[str, ...], tuple[Incline, ...]]:
+    """Return means over all sessions with the same predictions, by their names."""
+    scenes: dict[str, list[SessionPart]] = {}
+    for part in parts:
+        own = part.protocol
+        scene = (own.chains, own.surface, own.contact, own.drop, own.gravity, own.drag)
+        scenes.setdefault(repr((*scene, own.track, own.initial_speed)), []).append(part)
+    return {
+        tuple(part.name for part in alike): summarize(
+            alike[0].protocol, [run for part in alike for run in part.analysis.runs]
+        )
+        for alike in scenes.values()
+    }
+
+
+def _check_repeats(files: Iterable[Reader]) -> None:
     """Raise an error if drops would count twice: the same session, its copy or continuation."""
-    recorded = [(str(file.path), {*part.edges}) for file, part in zip(files, own, strict=True)]
-    for (path, edges), (other_path, rest) in combinations(recorded, 2):
+    recorded = (
+        (str(file.path), {edges_digest(drop) for drop in file.drops() if drop.edges})
+        for file in files
+    )
+    for (path, edges), (other, rest) in combinations(recorded, 2):
         common = len(edges & rest)
         # With few edges and a coarse timer, single drops may be equal by chance.
         if common and common == min(len(edges), len(rest)):
-            values = {"path": other_path, "other": path, "drops": common}
-            raise rig_error("session_repeated", **values)
+            raise rig_error("session_repeated", path=other, other=path, drops=common)
 
 
-def _check_whole(path: str, analysis: Analysis, planned: int, *, unfinished: bool) -> None:
+def _check_whole(session: Reader, analysis: Analysis, planned: int, *, unfinished: bool) -> None:
     """Raise an error for a session that is damaged, or lacks runs."""
+    path, missing = str(session.path), planned - len(analysis.runs)
     if analysis.damaged:
-        records = "; ".join(analysis.damage)
-        raise rig_error("records_damaged", path=path, records=records)
-    missing = planned - len(analysis.runs)
+        raise rig_error("records_damaged", path=path, records="; ".join(analysis.damage))
     if missing and not unfinished:
-        counts = {"missing": missing, "planned": planned}
-        raise rig_error("session_unfinished", path=path, **counts)
+        raise rig_error("session_unfinished", path=path, missing=missing, planned=planned)
     if not any(run.verdict in GOOD for run in analysis.runs):
         raise rig_error("session_no_results", path=path)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from rig.analysis.gravity import GravityCheck, check_gravity
+from rig.analysis.plain_data import attributes, plain
 from rig.analysis.session import Analysis, Progress, analyze
 from rig.analysis.summary import Incline
 from rig.cache.entry import CacheEntry
@@ -17,12 +19,12 @@ from rig.clock.calibration import Calibration, Calibrator, TimeScale
 from rig.protocol import reader
 from rig.protocol.measurable import with_gates
 from rig.protocol.protocol import Protocol
-from rig.reasons import Reason, notes_in
+from rig.reasons import Reason, notes_in, rig_error
 from rig.records import Drop, Job
-from rig.results.blind import check_open, kept_back, veil
+from rig.results.blind import veil
 from rig.results.improvements import improvements
-from rig.results.known_drops import KnownDrops, edges_digest
-from rig.session.reading import Reader
+from rig.results.known_drops import KnownDrops
+from rig.session.reading import Reader, StateEntry
 from rig.session.schema import RunState
 
 _MOST_PROCESSES = 4
@@ -39,8 +41,6 @@ class SessionResults:
         Analysis of all drops; without values if the session is blind.
     time_scales
         Calibration of each drop, by run and attempt.
-    edges
-        Digest of the edges of each drop that has any.
     gravity
         Check of gravity by the free chain; `None` if there is no suitable chain.
     simulated
@@ -57,7 +57,6 @@ class SessionResults:
 
     analysis: Analysis
     time_scales: Mapping[tuple[int, int], Mapping[str, Any]]
-    edges: tuple[str, ...]
     gravity: GravityCheck | None
     simulated: bool
     clock: Calibration
@@ -90,13 +89,11 @@ class SessionResults:
 
     def json(self) -> dict[str, Any]:
         """Return the object that `rig analyze --json` prints."""
-        fields = self.analysis.json()
+        head = attributes(self, "simulated", "clock=clock.details", "blind?", "calibration")
+        fields = head | self.analysis.json()
         for run in (*fields["runs"], *fields.get("superseded", [])):
             run["calibration"] = self.time_scales[run["run"], run["attempt"]]
-        head = {"simulated": self.simulated, "clock": self.clock.details}
-        head |= {"blind": True} if self.blind else {}
-        better = [improvement.json() for improvement in improvements(self.analysis.summary)]
-        return head | {"calibration": self.calibration} | fields | {"measure_next": better}
+        return fields | {"measure_next": plain(improvements(self.summary))}
 
 
 def protocol_of(session: Reader) -> Protocol:
@@ -104,9 +101,32 @@ def protocol_of(session: Reader) -> Protocol:
 
     Timers other than our boards may have fewer beams than the protocol.
     """
-    protocol = reader.parse(session.protocol_text, session.protocol_source, kept=True)
     had = next((board["beams"] for _, board in session.identities() if "beams" in board), None)
-    return protocol if had is None else with_gates(protocol, had)
+    beams = None if had is None else tuple(had)
+    return _read_protocol(session.protocol_text, session.protocol_source, beams)
+
+
+@lru_cache(maxsize=8)
+def _read_protocol(text: str, source: str, beams: tuple[int, ...] | None) -> Protocol:
+    protocol = reader.parse(text, source, kept=True)
+    return protocol if beams is None else with_gates(protocol, beams)
+
+
+def kept_back(session: Reader) -> bool:
+    """Whether a session's results are still withheld, see `rig.results.blind`."""
+    return protocol_of(session).blind and not session.unblinded
+
+
+def check_open(session: Reader) -> None:
+    """Raise an error if a session's results are still withheld.
+
+    Raises
+    ------
+    SessionError
+        The session is blind.
+    """
+    if kept_back(session):
+        raise rig_error("session_blind", path=str(session.path))
 
 
 def calibration(session: Reader) -> Calibration:
@@ -142,24 +162,21 @@ def results(
 
 def _analyze(session: Reader, progress: Progress | None, *, fresh: bool) -> SessionResults:
     """Return the results of a session by a new analysis, with its joint fit."""
-    protocol = protocol_of(session)
+    protocol, clock, states = protocol_of(session), calibration(session), session.states()
     scales: dict[tuple[int, int], Mapping[str, Any]] = {}
-    edges: list[str] = []
 
     def scale(drop: Drop) -> TimeScale:
-        scales[drop.run, drop.attempt] = clock.describe(drop)
-        edges.extend([edges_digest(drop)] if drop.edges else [])
+        scales[drop.job] = clock.describe(drop)
         return clock.scale(drop)
 
-    digest, blind = session.digest(), kept_back(session, protocol)
-    clock = Calibrator().look(session, protocol.reference_u)
-    total = sum(entry.state is RunState.RECORDED for entry in session.states())
+    digest, blind = session.digest(), kept_back(session)
+    total = sum(entry.state is RunState.RECORDED for entry in states)
     known = KnownDrops(protocol, blind=blind, fresh=fresh)
-    causes, arguments = rejected_drops(session), (progress, known, total, _processors())
+    causes, arguments = rejected_drops(states), (progress, known, total, _processors())
     complete = analyze(protocol, session.drops(), scale, causes, *arguments)
     analysis = veil(complete) if blind else complete
     gravity = check_gravity(protocol, analysis.runs)
-    outcome = analysis, scales, tuple(edges), gravity, session.simulated, clock, blind, digest
+    outcome = analysis, scales, gravity, session.simulated, clock, blind, digest
     return SessionResults(*outcome, None if blind else complete)
 
 
@@ -185,21 +202,26 @@ def complete_analysis(
     SessionError
         The session is blind.
     """
-    check_open(session, protocol_of(session))
+    check_open(session)
     with session.snapshot():
         analysis = (known and known.complete) or _analyze(session, progress, fresh=False).complete
     assert analysis is not None
     return analysis
 
 
-def rejected_drops(session: Reader) -> dict[tuple[int, int], tuple[Reason, ...]]:
+def rejected_drops(states: Iterable[StateEntry]) -> dict[tuple[int, int], tuple[Reason, ...]]:
     """Return the causes of drops that the operator rejected, by run and attempt."""
-    last = {(entry.run, entry.attempt): entry for entry in session.states()}
-    return {key: entry.reasons for key, entry in last.items() if entry.state is RunState.REJECTED}
+    last = last_entries(states).items()
+    return {job: entry.reasons for job, entry in last if entry.state is RunState.REJECTED}
 
 
 def notes(session: Reader) -> dict[Job, str]:
     """Return the operators' latest notes on drops, in order of recording."""
-    last = {Job(entry.run, entry.attempt): entry for entry in session.states()}
-    texts = {job: " · ".join(notes_in(entry.reasons)) for job, entry in last.items()}
+    last = last_entries(session.states()).items()
+    texts = {job: " · ".join(notes_in(entry.reasons)) for job, entry in last}
     return {job: text for job, text in texts.items() if text}
+
+
+def last_entries(states: Iterable[StateEntry]) -> dict[Job, StateEntry]:
+    """Return the latest entry of each drop in the log of states."""
+    return {Job(entry.run, entry.attempt): entry for entry in states}

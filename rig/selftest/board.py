@@ -15,7 +15,7 @@ from rig.link.frames import Frame, encode
 from rig.link.messages import TEST_RUN, DisarmReason, Phase, RefusalReason, pack_label, unpack_label
 from rig.link.port import Port, port_clock
 from rig.link.transcript import Record
-from rig.reasons import make_error, rig_error
+from rig.reasons import error_of, make_reason, rig_error
 from rig.records import Edge
 from rig.selftest.findings import NotPossibleError, fail_if, insist, need, wrong_answer
 
@@ -177,7 +177,7 @@ class BoardUnderTest(Device):
             It does not come to rest.
         """
         if drop := self.foreign_drop():
-            raise make_error(NotPossibleError, "drop_held", **drop)
+            raise error_of(NotPossibleError, make_reason("drop_held", **drop))
         self.abort()
         label = self.state().label
         if label and (held := self.collect(label, 0.0).certificate):
@@ -260,5 +260,5 @@ class BoardUnderTest(Device):
             It never said so.
         """
         if self.transcript.identity is None:
-            raise make_error(NotPossibleError, "no_identity")
+            raise error_of(NotPossibleError, make_reason("no_identity"))
         return self.transcript.identity

@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import NamedTuple
 
 from rig.errors import DeviceError, RigError, SessionError
-from rig.reasons import Reason, make_error, make_reason, remedies
+from rig.reasons import Reason, error_of, make_reason, remedies, rig_error
 
 _ENUM = re.compile(r"<(?:\w+\.)?([\w|]+): \w+>")  # as Python writes a member of an enumeration
 
@@ -70,23 +70,23 @@ def explain(name: str, error: RigError, verdict: Verdict = Verdict.FAILED) -> Fi
     return Finding(name, reason.text, verdict, reason)
 
 
-def wrong_answer(request: str, expected: object, answer: object) -> DeviceError:
+def wrong_answer(request: str, expected: object, answer: object) -> RigError:
     """Return the failure of a board that gave another answer than expected."""
     expected, answer = (_ENUM.sub(r"\1", str(value)) for value in (expected, answer))
     values = {"request": request, "expected": expected, "answer": answer}
-    return make_error(DeviceError, "wrong_answer", **values)
+    return rig_error("wrong_answer", **values)
 
 
 def fail_if(broken: object, code: str, **values: object) -> None:
     """Let a check fail for a reason if that is so."""
     if broken:
-        raise make_error(DeviceError, code, **values)
+        raise error_of(DeviceError, make_reason(code, **values))
 
 
 def need(present: object, needed: str) -> None:
     """Let a check be impossible, by saying what it needs, unless that is there."""
     if not present:
-        raise make_error(NotPossibleError, "check_needs", needed=needed)
+        raise error_of(NotPossibleError, make_reason("check_needs", needed=needed))
 
 
 def insist(request: str, answer: object, expected: object) -> None:

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from rig.errors import SessionError
-from rig.reasons import make_error
+from rig.errors import RigError, SessionError
+from rig.reasons import rig_error
 from rig.wordings import WORDINGS
 
 UNREADABLE = (sqlite3.Error, UnicodeDecodeError)
@@ -29,13 +29,13 @@ _OTHERS = {
 """Other errors, the most specific first."""
 
 
-def as_session_error(path: Path, error: Exception) -> SessionError:
+def as_session_error(path: Path, error: Exception) -> RigError:
     """Return the `SessionError` for an error of SQLite, the disk or a row, with its own message."""
     name = getattr(error, "sqlite_errorname", "")  # absent on errors of the Python wrapper
     primary = "_".join(name.lower().split("_")[:2])  # of SQLITE_IOERR_WRITE
     other = next(code for kind, code in _OTHERS.items() if isinstance(error, kind))
     code = _SAME.get(primary, primary if primary in WORDINGS else other)
-    return make_error(SessionError, code, path=path, text=error)
+    return rig_error(code, path=path, text=error)
 
 
 @contextmanager

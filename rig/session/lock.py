@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from rig.errors import SessionError
-from rig.reasons import make_error, rig_error
+from rig.reasons import rig_error
 
 _POLL_S = 0.0025
 _LOOK_S = 0.01  # a check for a writer holds the lock for microseconds
@@ -55,7 +55,7 @@ class WriterLock:
         except OSError as error:
             self._lock.release()
             code = _CODES.get(error.errno or 0, "cannot_lock")
-            raise make_error(SessionError, code, path=session, text=error) from error
+            raise rig_error(code, path=session, text=error) from error
 
     def release(self) -> None:
         """Release the lock and remove its file; further calls do nothing."""

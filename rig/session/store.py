@@ -9,7 +9,7 @@ import os
 import platform
 import sqlite3
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import ExitStack, closing, suppress
+from contextlib import AbstractContextManager, ExitStack, closing, suppress
 from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
@@ -36,7 +36,7 @@ log = logging.getLogger(__name__)
 _TIMINGS = {ClockSample: "ping", Pulse: "reference", HostBreak: "host_break"}
 
 
-class Session(Reader):
+class Session(Reader, AbstractContextManager["Session"]):
     """An open session file; use `create` or `open`.
 
     Added records wait in an open transaction until `commit`, which returns when they are on disk.
@@ -229,9 +229,6 @@ class Session(Reader):
         """Merge the log into the file, so that the file alone can be copied despite readers."""
         with suppress(sqlite3.Error):
             self.connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_exc: object) -> None:
         self.close()  # also after an error, to keep all measured data

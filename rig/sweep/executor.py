@@ -14,16 +14,9 @@ from threading import Thread
 from typing import Any
 
 from rig import __version__
-from rig.errors import RigError
-from rig.reasons import make_error
+from rig.reasons import rig_error
 
 PATIENCE_S = 8.0
-
-
-class ClusterError(RigError):
-    """A cluster cannot be reached, is not fit or breaks off, exit code 4."""
-
-    exit_code = 4
 
 
 @contextmanager
@@ -55,7 +48,7 @@ def executor(jobs: int | None, address: str | None) -> Iterator[tuple[Executor, 
         yield client.get_executor(pure=False), sum(client.nthreads().values())
     except (KilledWorker, CommClosedError, CancelledError) as error:
         cause = _first_line(error)
-        raise make_error(ClusterError, "cluster_lost", address=address, cause=cause) from error
+        raise rig_error("cluster_lost", address=address, cause=cause) from error
     finally:
         client.close(timeout=PATIENCE_S)
 
@@ -77,16 +70,16 @@ def _connect(address: str) -> Any:
         client, versions = answer.result(1.25 * PATIENCE_S)
     except Exception as error:  # whatever answers there may answer anything
         words = {"address": address, "cause": _first_line(error)}
-        raise make_error(ClusterError, "cluster_unreachable", **words) from error
+        raise rig_error("cluster_unreachable", **words) from error
     unlike = {worker: theirs for worker, theirs in versions.items() if theirs != __version__}
     if versions and not unlike:
         return client
     client.close(timeout=1.0)
     if not versions:
-        raise make_error(ClusterError, "cluster_empty", address=address)
+        raise rig_error("cluster_empty", address=address)
     worker, theirs = unlike.popitem()
     words = {"address": address, "version": __version__, "worker": worker, "other": theirs}
-    raise make_error(ClusterError, "cluster_unlike", **words)
+    raise rig_error("cluster_unlike", **words)
 
 
 def _ask(address: str, answer: Future[tuple[Any, dict[str, str]]]) -> None:

@@ -35,10 +35,8 @@ if TYPE_CHECKING:
 
     from textual.filter import LineFilter
 
-    from rig.results.live import SessionView
     from rig.tui.context import Options
     from rig.tui.desk import Face
-    from rig.tui.indicators import Indicators
 
 TICK_S = 0.1
 _LEAST_S = 0.01  # least time between ticks, after a late tick
@@ -131,10 +129,9 @@ class RigApp(App[None], inherit_bindings=False):
         self.keys: Mapping[str, str] = keys
         self.action_of = {key: name for name, text in keys.items() for key in text.split(",")}
         self.page: str = ""
-        self.client = client
+        # Offline it is never connected.
+        self.client = client or ReconnectingClient(options.port, options.socket, self._resume)
         self._loaded = loaded
-        if client is None and not options.offline:
-            self.client = ReconnectingClient(options.port, options.socket, self._resume)
         self.follower = Follower(self.client, self.begin)
         start = Stage.DONE if options.offline else Stage.PROTOCOL
         flow = Flow(stage=start, countdown_s=options.countdown_s)
@@ -167,7 +164,7 @@ class RigApp(App[None], inherit_bindings=False):
         yield StopBar()
 
     async def on_mount(self) -> None:
-        if self.client is not None:
+        if not self.options.offline:
             self.run_worker(self.client.keep(), group="client")
         elif self.options.session is not None:
             self.follower.look_at(self.options.session)
@@ -177,8 +174,7 @@ class RigApp(App[None], inherit_bindings=False):
         self.call_after_refresh(lambda: self.begin(self._load_pages()))
 
     def on_unmount(self) -> None:
-        if self.client is not None:
-            self.client.end_trial()
+        self.client.end_trial()
 
     def begin(self, work: commands.Work) -> None:
         """Run a coroutine, if any, in the background, and show its error if it fails."""
@@ -206,11 +202,10 @@ class RigApp(App[None], inherit_bindings=False):
         if self.flow.stage is Stage.COUNTDOWN:
             self.driver.take(campaign.Tick(min(passed, _COUNTED_S)))
         self.desk.tick(self.model, passed)
-        begins = self.flow.stage is Stage.PROTOCOL and now - self._looked_s >= _LOOK_S
-        if begins and self.client is not None:
+        if self.flow.stage is Stage.PROTOCOL and now - self._looked_s >= _LOOK_S:
             self._looked_s = now
-            self.begin(self._look_around(self.client))
-        if self.client is not None and self.client.changed:
+            self.begin(self._look_around())
+        if self.client.changed and not self.options.offline:
             self.client.changed = False
             reopens = self.driver.asked is not None
             for event in self.follower.absorb(self.flow.stage, now, reopens=reopens):
@@ -261,49 +256,38 @@ class RigApp(App[None], inherit_bindings=False):
         return self.driver.flow
 
     @property
-    def indicators(self) -> Indicators:
-        """The gates."""
-        return self.follower.indicators
-
-    @property
-    def view(self) -> SessionView | None:
-        """Latest view of the session file."""
-        return self.follower.view
-
-    @property
     def driving(self) -> bool:
         """Whether this screen has control of the rig."""
-        return self.client is not None and self.client.driving
+        return self.client.driving
 
     @property
     def model(self) -> Model:
         """Return the data of the pages at this moment."""
-        client, follower = self.client, self.follower
+        client, follower, offline = self.client, self.follower, self.options.offline
         return Model(
             state=follower.state,
             flow=self.flow,
             stop=self.driver.stop,
-            disk_s=client.disk_s if client else 0.0,
+            disk_s=client.disk_s,
             indicators=follower.indicators,
             view=follower.view,
             voids=follower.voids,
-            connected=client is None or client.up,
+            connected=offline or client.up,
             driving=self.driving,
             now_s=monotonic(),
-            silence=client.silence if client else "",
-            port=client.port if client else "",
-            offline=client is None,
+            silence=client.silence,
+            port=client.port,
+            offline=offline,
             unreadable=follower.unreadable,
             read=follower.done,
             page=self.page,
-            idle=client is not None and client.idle,
+            idle=client.idle and not offline,
         )
 
     # ------------------------------------------------------------------ flow and pages
 
     async def _resume(self) -> None:
         """Continue after the daemon, or a new one, was reached."""
-        assert self.client is not None
         if self.driver.asked and self.client.driving and not self.client.state.section("session"):
             await self._try(self.driver.open_session(*self.driver.asked, self.options.seed))
 
@@ -346,10 +330,10 @@ class RigApp(App[None], inherit_bindings=False):
         self.desk.chart += chart
         self.draw()
 
-    async def _look_around(self, client: ReconnectingClient) -> None:
+    async def _look_around(self) -> None:
         """Update the list of the home page: sessions, protocols and boards."""
         survey = await asyncio.to_thread(import_module, "rig.tui.survey")
-        port, other = client.port if not client.idle else "", client.in_the_way
+        port, other = self.client.port, self.client.in_the_way
         rows = await asyncio.to_thread(
             survey.look_around, self.options, port, other[0] if other else ""
         )
@@ -465,12 +449,12 @@ class RigApp(App[None], inherit_bindings=False):
         action = BY_NAME[name]
         if self.possible(action):
             commands.do(self, name)
-        elif self.client is not None and action.driving and not self.driving:
+        elif action.driving and not self.driving and not self.options.offline:
             self.driver.take(campaign.EffectFailure(self.flow.ticket, _WATCHING))
 
     def possible(self, action: Action) -> bool:
         """Whether an action is possible now."""
-        if self.client is None and (action.driving or action.name in NEEDS_RIG):
+        if self.options.offline and (action.driving or action.name in NEEDS_RIG):
             return False
         # Without a rig, an operator may start with a new one.
         begins = action.name == "go_on" and self.flow.stage is Stage.PROTOCOL

@@ -98,10 +98,7 @@ class ReconnectingClient:
     @property
     def state(self) -> DaemonState:
         """Latest state of the daemon."""
-        if self._client is None:
-            return DaemonState()
-        replica = self._client.replica
-        return read_state(replica.n, replica.state) if replica.state else DaemonState()
+        return read_state(self._client.replica.state if self._client else {})
 
     @property
     def driving(self) -> bool:
@@ -116,17 +113,18 @@ class ReconnectingClient:
         mine: bool = control["client"] == self.name
         return mine
 
-    async def call(self, method: str, **params: Any) -> Any:
-        """Call a method of the daemon.
+    @property
+    def connection(self) -> AsyncClient:
+        """The connection, to which requests go; the daemon's errors come from there.
 
         Raises
         ------
-        RigError
-            The daemon raised it, or there is no daemon.
+        DeviceError
+            There is none at present.
         """
         if self._client is None:
             raise DeviceError(f"no daemon: {self.silence}", "reconnecting")
-        return await self._client.call(method, **params)
+        return self._client
 
     async def take_control(self) -> None:
         """Take control, now and after each reconnection.
@@ -137,13 +135,13 @@ class ReconnectingClient:
             Another client has it.
         """
         self._wants_control = True
-        await self.call("take_control")
+        await self.connection.call("take_control")
         self._had_control = True
 
     async def release_control(self) -> None:
         """Release control permanently."""
         self._wants_control = self._had_control = False
-        await self.call("release_control")
+        await self.connection.call("release_control")
 
     async def go_to(self, url: str, *, trial: bool = False) -> None:
         """Switch to the daemon of another port.
@@ -196,9 +194,9 @@ class ReconnectingClient:
             return
         reached = None
         try:
-            await self._check(client)
+            self._check(client.line.daemon)
             client.changed = partial(self._note, client.replica)
-            await client.subscribe()
+            await client.call("subscribe")
             self._client, self.silence = client, ""
             if self._wants_control and client.replica.state.get("control") is None:
                 with suppress(RigError):
@@ -231,7 +229,7 @@ class ReconnectingClient:
                 self.silence = (
                     f"no answer for {monotonic() - begun:.0f} s\n"
                     "an armed board has switched itself off and keeps a drop that fell; "
-                    f"if this stays: kill -9 {client.replica.state['daemon']['pid']}"
+                    f"if this stays: kill -9 {client.line.daemon['pid']}"
                 )
         if answer.exception() is None:
             self.changed |= self._hangs or self.disk_s > 0.0
@@ -240,12 +238,11 @@ class ReconnectingClient:
             with suppress(TimeoutError):
                 await asyncio.wait_for(client.lost.wait(), _BEAT_S)
 
-    async def _check(self, client: AsyncClient) -> None:
+    def _check(self, daemon: Mapping[str, Any]) -> None:
         """Check that the daemon has the requested port."""
-        await client.subscribe()
-        self._port = str(client.replica.state["port"]["url"])
+        self._port = str(daemon["port"])
         if self.url and self._port != self.url:
-            self.in_the_way = self._port, int(client.replica.state["daemon"]["pid"])
+            self.in_the_way = self._port, int(daemon["pid"])
             raise rig_error("daemon_port", port=self._port, wanted=self.url)
 
     def _start(self, error: DeviceError) -> None:

@@ -82,7 +82,7 @@ def _go_on(app: RigApp) -> Work:
 def _open(app: RigApp, row: Beginning) -> Work:
     """Open an experiment with the connected rig, or in simulation without a rig."""
     client = app.client
-    if client is None or row.file is None:
+    if row.file is None:
         return None
     if app.desk.reading(row.file).problem:
         app.tell("mend the file in an editor; it is read again by itself")
@@ -101,7 +101,7 @@ def _open(app: RigApp, row: Beginning) -> Work:
 
 def _connect(app: RigApp, row: Beginning) -> None:
     """Switch to a board; ends a trial."""
-    if app.client is not None and row.value:
+    if row.value:
         app.driver.asked = None
         app.begin(app.client.go_to(row.value))
         app.tell("choose an experiment; then each gate is checked by hand")
@@ -125,7 +125,7 @@ def _new(app: RigApp, row: Beginning) -> Work:
 def _end_other(app: RigApp, row: Beginning) -> None:
     """Ask, then end the daemon of another port."""
     client = app.client
-    if client is None or client.in_the_way is None:
+    if client.in_the_way is None:
         return
     port, process = client.in_the_way
 
@@ -152,7 +152,6 @@ _BEGIN: dict[str, Callable[[RigApp, Beginning], Work]] = {
 def _control(app: RigApp) -> Work:
     """Take control, or ask whether to give it back."""
     client = app.client
-    assert client is not None
     if not client.driving:
         return client.take_control()
     question = "Another screen can then take it; this screen keeps watching."
@@ -162,12 +161,10 @@ def _control(app: RigApp) -> Work:
 
 def _close(app: RigApp) -> None:
     """Ask, then close the session, so that another can be chosen."""
-    client = app.client
-    assert client is not None
 
     def close() -> Work:
         app.driver.asked = None
-        return client.call("close_session")
+        return _ask(app, "close_session")
 
     question = "Everything recorded stays in its file. You can continue it later."
     _confirm(app, "Close the session?", question, "close", close)
@@ -175,14 +172,19 @@ def _close(app: RigApp) -> None:
 
 def _quit(app: RigApp) -> None:
     """Ask, then quit."""
-    question = "The rig keeps running after you quit." if app.client else ""
-    if app.client and app.client.is_trial:
+    question = "" if app.options.offline else "The rig keeps running after you quit."
+    if app.client.is_trial:
         question = "The simulation ends too. What it has recorded stays in its file."
     _confirm(app, "Quit?", question, "quit", app.exit)
 
 
 def _confirm(app: RigApp, title: str, question: str, yes: str, act: Callable[[], Work]) -> None:
     app.ask(Confirm(title, question, yes), lambda _: act())
+
+
+async def _ask(app: RigApp, method: str) -> None:
+    """Ask the daemon for something; see rig/daemon/API.md."""
+    await app.client.connection.call(method)
 
 
 def _try_release(app: RigApp) -> None:
@@ -320,13 +322,11 @@ def _repeat(app: RigApp) -> None:
 
 def _unblind(app: RigApp) -> None:
     """Ask, then unblind the session."""
-    client = app.client
-    assert client is not None
     if not app.model.blind:
         app.driver.take(Notice("this session is not blind\nwrite blind: true in its protocol"))
         return
     question = "This shows all results. It is recorded and cannot be undone."
-    _confirm(app, "Unblind the session?", question, "show results", partial(client.call, "unblind"))
+    _confirm(app, "Unblind the session?", question, "show results", lambda: _ask(app, "unblind"))
 
 
 def _begin_check(app: RigApp) -> None:

@@ -41,7 +41,7 @@ class Driver:
     def __init__(
         self,
         flow: Flow,
-        client: ReconnectingClient | None,
+        client: ReconnectingClient,
         follower: Follower,
         begin: Callable[[Coroutine[Any, Any, None]], object],
     ) -> None:
@@ -58,7 +58,7 @@ class Driver:
         if self.flow.stage is Stage.RESULT and self.flow.job is not None:
             self._follower.judged.add(self.flow.job)
         for effect in effects:
-            if isinstance(effect, campaign.Stop) and (self._client is None or self._client.idle):
+            if isinstance(effect, campaign.Stop) and self._client.idle:
                 continue  # without a rig, no chain can fall
             if isinstance(effect, campaign.Stop):
                 self.stop = StopAnswer(monotonic())
@@ -70,15 +70,13 @@ class Driver:
 
     async def open_session(self, protocol: str, session: str, seed: int | None) -> None:
         """Open a session in the daemon, now and after each restart."""
-        assert self._client is not None
-        await self._client.call("open_session", protocol=protocol, session=session, seed=seed)
+        names = {"protocol": protocol, "session": session, "seed": seed}
+        await self._client.connection.call("open_session", **names)
         self.asked = protocol, session
 
     async def _carry_out(self, effect: Effect, ticket: int) -> None:
         """Carry out an effect, and handle the resulting event."""
-        client = self._client
-        assert client is not None
-        token = None
+        client, token = self._client, None
         try:
             match effect:
                 case campaign.GiveUp():
@@ -87,19 +85,19 @@ class Driver:
                     await self._switch_off(client, reason)
                     return
                 case campaign.Wait(seconds):
-                    await client.call("wait", seconds=seconds)
+                    await client.connection.call("wait", seconds=seconds)
                 case campaign.ArmRelease(job):
-                    answer = await client.call("arm", **job._asdict())
+                    answer = await client.connection.call("arm", **job._asdict())
                     token = int(answer["token"])
                 case campaign.FireRelease(armed):
-                    await client.call("fire", token=armed)
+                    await client.connection.call("fire", token=armed)
                 case campaign.Drive():
-                    await client.call("test_release")
+                    await client.connection.call("test_release")
                 case campaign.Collect(job):
-                    await client.call("collect", **job._asdict())
+                    await client.connection.call("collect", **job._asdict())
                 case campaign.Log(job, state, reasons):
-                    records = [reason.record() for reason in reasons]
-                    await client.call("log_state", **job._asdict(), state=state, reasons=records)
+                    verdict = {"state": state, "reasons": [reason.record() for reason in reasons]}
+                    await client.connection.call("log_state", **job._asdict(), **verdict)
                 case campaign.Judge(job):
                     result = (await self._follower.read()).results[job]
                     row = self._follower.voids.row
@@ -118,7 +116,7 @@ class Driver:
         asked, is_known = self.stop, False
         while not is_known and asked is self.stop:
             try:
-                await client.call("stop", reason=reason)
+                await client.connection.call("stop", reason=reason)
             except RigError as error:
                 heard, is_known = False, not isinstance(error, DeviceTimeoutError)
             else:

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol, Run
     from rig.records import Job
     from rig.results.live import SessionView
-    from rig.units import Quantity
 
 
 LOOKS = {
@@ -34,11 +33,6 @@ _PAST = 6
 """Number of drops in the strip of past runs, to fit 80 columns."""
 
 
-def as_measured(model: Quantity) -> Measured | float:
-    """Return a prediction as a measured value with U95, or as a number if exact."""
-    return Measured(model.value, model.u) if model.u else model.value
-
-
 def headline(run: Run, total: int, attempt: int) -> str:
     """Return the headline of a run: number, attempt, incline and striking chain."""
     again = f" · attempt {attempt}" if attempt > 1 else ""
@@ -52,7 +46,7 @@ def expected_words(protocol: Protocol, run: Run) -> str:
     """Return the model's prediction for a run in words; empty without a prediction."""
     expected = predicted_run(protocol, run)
     values = [
-        f"{row.symbol} {plus_minus(as_measured(expected[row.name]), row.scale)} {row.unit}"
+        f"{row.symbol} {plus_minus(expected[row.name], row.scale)} {row.unit}"
         for row in averaged()
         if row.name in expected
     ]
@@ -67,7 +61,7 @@ def sentence(view: SessionView, job: Job) -> str:
         return ""
     measured = result.quantities[row.name]
     expected = predicted_run(view.protocol, run).get(row.name)
-    beside = "" if expected is None else f"; model {plus_minus(as_measured(expected), row.scale)}"
+    beside = "" if expected is None else f"; model {plus_minus(expected, row.scale)}"
     size = plus_minus(Measured(abs(measured.value), measured.u), row.scale)
     if row == SEPARATION and run.impact is not None:
         wins = "wins" if measured.value > 0.0 else "loses"

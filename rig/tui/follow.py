@@ -62,7 +62,7 @@ class Follower:
 
     def __init__(
         self,
-        client: ReconnectingClient | None,
+        client: ReconnectingClient,
         begin: Callable[[Coroutine[Any, Any, None]], object],
     ) -> None:
         self.state = DaemonState()
@@ -88,7 +88,12 @@ class Follower:
     def look_at(self, path: Path) -> None:
         """Show a file that has no writer."""
         self._forget(path)
-        self._begin(self._read_quietly())
+        self._begin(self._show_file())
+
+    async def _show_file(self) -> None:
+        await self._read_quietly()
+        if self.view is not None:
+            self.state, self.indicators = state_of(self.view), Indicators.of(self.view.channels)
 
     def look_with(self, live: LiveAnalysis) -> None:
         """Show a file with an existing live analysis."""
@@ -109,10 +114,8 @@ class Follower:
         reopens
             Whether a closed session will be opened again from here.
         """
-        client = self._client
-        assert client is not None
-        before, state = self.state, client.state
-        self.state = state
+        client, before = self._client, self.state
+        state = self.state = client.state
         self._look_at_gates(state, now)
         if not client.up:
             return [campaign.Lost(_UNHEARD if stage in BEFORE_RELEASE else _UNSEEN)]
@@ -192,11 +195,7 @@ class Follower:
     def _take(self, view: SessionView) -> None:
         self.view, self.unreadable = view, ""
         self.voids = voids_of(view.states)
-        if self._client is not None:
-            self._client.changed = True
-        else:
-            self.state = state_of(view)
-            self.indicators = Indicators.of(view.channels)
+        self._client.changed = True
 
     async def _read_quietly(self) -> None:
         try:

@@ -14,9 +14,9 @@ from rig.vocabulary import ANY_SCENE
 
 if TYPE_CHECKING:
     from rig.campaign.machine import Flow
-    from rig.campaign.plan import RunLine
     from rig.protocol.protocol import Protocol, Run
     from rig.reasons import Reason
+    from rig.recorder.run_lines import RunLine
     from rig.results.live import SessionView
     from rig.tui.indicators import Indicators
     from rig.tui.state import DaemonState

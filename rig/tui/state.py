@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from rig.campaign.plan import RunLine, plan_lines
-from rig.reasons import read_record
+from rig.recorder.run_lines import RunLine, plan_lines, read_line
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -26,8 +25,6 @@ class DaemonState:
 
     Attributes
     ----------
-    n
-        Number of the last included change; −1 before the first snapshot.
     sections
         Sections by name, as received, without the two below.
     runs
@@ -36,7 +33,6 @@ class DaemonState:
         Edges of the latest drop, as received: tick, gate, state after it.
     """
 
-    n: int = -1
     sections: Mapping[str, Any] = field(default_factory=lambda: EMPTY)
     runs: tuple[RunLine, ...] = ()
     edges: tuple[Sequence[int], ...] = ()
@@ -80,36 +76,22 @@ class DaemonState:
         return next((line for line in self.runs if line.run == run), None)
 
 
-def read_state(n: int, state: Mapping[str, Any]) -> DaemonState:
+def read_state(state: Mapping[str, Any]) -> DaemonState:
     """Return the present state of the daemon's sections, unaffected by later changes.
 
     Parameters
     ----------
-    n
-        Number of their last change.
     state
-        Sections by name. Entries of its lists are replaced by the replica, never changed.
+        Sections by name; none before the first snapshot. Entries of its lists are replaced by the
+        replica, never changed.
     """
     sections = {name: value for name, value in state.items() if name not in {"runs", "edges"}}
-    return DaemonState(
-        n, sections, tuple(map(_line, state.get("runs") or ())), tuple(state.get("edges") or ())
-    )
-
-
-def _line(run: Mapping[str, Any]) -> RunLine:
-    return RunLine(
-        run["run"],
-        float(run["incline_deg"]),
-        run["impact"],
-        run["free"],
-        run["attempt"],
-        run["state"],
-        tuple(map(read_record, run["reason_codes"] or ())),
-    )
+    runs, edges = map(read_line, state.get("runs") or ()), state.get("edges") or ()
+    return DaemonState(sections, tuple(runs), tuple(edges))
 
 
 def state_of(view: SessionView) -> DaemonState:
     """Return the state that a daemon would have for a file without a writer."""
     runs = plan_lines(view.plan.values(), view.states)
     session = {"path": str(view.path), "title": view.protocol.title, "simulated": view.simulated}
-    return DaemonState(0, {"session": session}, tuple(runs))
+    return DaemonState({"session": session}, tuple(runs))

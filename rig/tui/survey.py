@@ -15,7 +15,7 @@ from rig.files import file_stamp
 from rig.flash.drive import waiting_drives
 from rig.protocol.plan import runs
 from rig.ready import ready_protocols
-from rig.results import protocol_of
+from rig.results.whole import protocol_of
 from rig.session.store import Session
 from rig.tui.beginnings import HERE, Beginning
 from rig.usb.listing import serial_ports

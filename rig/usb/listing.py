@@ -6,8 +6,7 @@ import os
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.boards import MEGA, PICO, UNO
-from rig.errors import DeviceError
-from rig.reasons import make_error, rig_error
+from rig.reasons import rig_error
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -123,7 +122,7 @@ def sole_port() -> str:
     paths = [port.path for port in serial_ports() if port.candidate]
     if len(paths) != 1:
         code = "many_boards" if paths else "no_board"
-        raise make_error(DeviceError, code, ports=" and ".join(paths))
+        raise rig_error(code, ports=" and ".join(paths))
     return paths[0]
 
 

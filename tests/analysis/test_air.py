@@ -10,15 +10,14 @@ import pytest
 
 from bench.studies.falls import Asked, falls
 from bench.studies.time_scales import time_scale
-from rig.analysis.air import lags
 from rig.analysis.chain_records import chain_records
+from rig.analysis.departures import lags, strike_shifts
 from rig.analysis.drop import DropCase
 from rig.analysis.drop_model import DropModel
 from rig.analysis.dual import Dual
 from rig.analysis.gravity import free_gravity
 from rig.analysis.quantities import AdjustedDrop
 from rig.analysis.session import analyze
-from rig.analysis.swing import strike_shifts
 from rig.protocol.plan import runs as planned
 from tests.analysis.drops import PROTOCOLS, SCENES, case, true_value
 from tests.analysis.sessions import MILD
@@ -91,7 +90,8 @@ def test_a_chain_arrives_when_its_top_rod_does(block):
     x[model.unknowns["alpha"]] = model.alpha
     x[model.unknowns[block]] = 1e-3
     drop = AdjustedDrop(model, x)
-    moment = Dual(np.array([drop.hit.value]), drop.hit.slopes[None])
+    hit = drop.arrival.when
+    moment = Dual(np.array([hit.value]), hit.slopes[None])
     off = abs(drop.ahead("impact", level).value[0])
     assert off > 0.5e-3
     assert abs(drop.top("impact", drop.levels("impact", moment))[0].value) < 0.01 * off

@@ -7,8 +7,7 @@ import pytest
 
 from rig.analysis.comparison import compare
 from rig.analysis.distributions import coverage_factor
-from rig.analysis.result import Deviation, Measured
-from rig.analysis.summary import good_cases
+from rig.analysis.result import Deviation, Measured, good_runs
 from rig.protocol.plan import runs
 from rig.units import Quantity
 from tests.analysis.drops import FENCE, UNIFORM
@@ -36,7 +35,7 @@ def compared(values: list[Measured]):
     drops = results(EXACT, {40.0: [0.0] * len(values)})
     drops = [replace(drop, quantities={"separation_m": one})
              for drop, one in zip(drops, values, strict=True)]  # fmt: skip
-    (comparison,) = compare(EXACT, good_cases(EXACT, drops))
+    (comparison,) = compare(EXACT, good_runs(drops))
     return comparison.differences[0]
 
 
@@ -58,7 +57,7 @@ def test_one_fall_is_off_by_its_own_scatter_and_n_by_its_share_but_by_no_less_th
 def test_what_the_protocol_states_of_coefficients_counts_once():
     """Against a model that is wrong by its own β, many inclines are no more than one."""
     found = analysis((30.0, 50.0, 70.0))
-    whole = {one.quantity: one for one in compare(UNIFORM, good_cases(UNIFORM, found.runs))}
+    whole = {one.quantity: one for one in compare(UNIFORM, good_runs(found.runs))}
     assert set(whole) == {"separation_m", "speed_m_s"}
     for one in whole.values():
         assert one.degrees == 3
@@ -82,5 +81,5 @@ def test_gravity_is_compared_with_what_the_protocol_states():
         run=run,
         quantities={"gravity_m_s2": Measured(9.86, 0.04)},
     )
-    (comparison,) = compare(stated, [[drop]])
+    (comparison,) = compare(stated, [drop])
     assert comparison.differences[0].normalized_error == pytest.approx(0.05 / (Z * 0.05), rel=2e-6)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rig.analysis.adjust import least_squares
+from rig.analysis.budget_lines import effective_degrees
 from rig.analysis.distributions import coverage_factor
-from rig.analysis.quantities import effective_degrees
 from tests.analysis.least_squares import plain_equations
 
 

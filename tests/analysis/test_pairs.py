@@ -33,7 +33,7 @@ def test_a_drift_cancels_and_the_difference_stays():
     found = effects(UNIFORM, made_up(lambda n, chain: 0.3 + 1e-3 * n + 2e-3 * (chain == "A")))
     assert [one.incline_deg for one in found] == sorted(UNIFORM.plan.inclines)
     for one in found:
-        assert (one.first, one.second, one.blocks) == ("A", "B", 3)
+        assert (one.chains, one.blocks) == (("A", "B"), 3)
         for measured in one.chain.values():
             assert measured.value == pytest.approx(2e-3, abs=1e-12)
         # Blocks drift apart from each other in what the sides do; their scatter says so.

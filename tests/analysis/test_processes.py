@@ -7,7 +7,6 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
-from itertools import repeat
 
 import pytest
 
@@ -27,7 +26,7 @@ def work(number):
 
 if __name__ == "__main__":
     try:
-        do_in_order(work, range(50), lambda *_: None, 50, 2)
+        list(do_in_order(work, range(50), 50, 2))
     except KeyboardInterrupt:
         sys.exit(130)
 """
@@ -44,18 +43,23 @@ def halve(number):
 
 
 def test_results_come_in_order_from_other_processes(eager):
-    taken = []
     numbers = [6, 3, 2, 1, 6, 3, 2, 1, 3]
-    processes.do_in_order(halve, iter(numbers), lambda *done: taken.append(done), len(numbers), 2)
+    taken = [*processes.do_in_order(halve, numbers, 9, 2)]
     assert [(number, half) for number, (_, half) in taken] == [(n, 6 // n) for n in numbers]
     here = [process == os.getpid() for _, (process, _) in taken]
-    assert here == [*repeat(True, 4), *repeat(False, 5)]
-    assert not multiprocessing.active_children()
+    assert here == [True] * 4 + [False] * 5
 
 
 def test_what_fails_in_another_process_fails_here(eager):
     with pytest.raises(ZeroDivisionError):
-        processes.do_in_order(halve, [1, 1, 1, 1, 1, 0, 1], lambda *_: None, 7, 2)
+        list(processes.do_in_order(halve, [1, 1, 1, 1, 1, 0, 1], 7, 2))
+    assert not multiprocessing.active_children()
+
+
+def test_who_takes_no_more_results_leaves_no_processes_behind(eager):
+    results = processes.do_in_order(halve, [1] * 99, 99, 2)
+    assert [next(results) for _ in range(6)]
+    results.close()
     assert not multiprocessing.active_children()
 
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.analysis.averages import combine, mean
+from rig.analysis.budget_lines import effective_degrees
 from rig.analysis.distributions import coverage_factor
-from rig.analysis.quantities import effective_degrees
 from rig.analysis.result import Audit, DropResult, Measured
 from rig.analysis.summary import summarize
 from rig.model.chain import Chain
@@ -115,7 +115,7 @@ def test_inclines_come_in_order_and_only_good_runs_count():
     # At 40°: 3.5 mm for β ± 0.05, 4.6 mm for μ ± 0.05 (here 0.02), 0.3 mm for 10 mm (here 2 mm).
     u = math.hypot(3.5e-3, 4.6e-3 * 0.4, 0.3e-3 * 0.2)
     assert first.predicted["separation_m"].u == pytest.approx(u, rel=0.02)
-    assert summarize(UNIFORM, []) == []
+    assert summarize(UNIFORM, []) == ()
 
 
 def test_outside_the_model_there_is_nothing_to_compare_with():

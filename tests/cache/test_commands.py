@@ -9,7 +9,7 @@ import pytest
 
 import rig
 from rig.analysis.drop import DropCase
-from rig.cache.store import CacheFile
+from rig.cache.store import CacheFolder
 from rig.cli import main
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -155,7 +155,7 @@ def test_another_program_computes_itself(fence, counted, monkeypatch):
 @pytest.mark.parametrize("text", ["", "[]", '["list",1]', "no JSON", '["rig.records:Job",1,1]'])
 def test_what_is_kept_and_cannot_be_read_is_computed_again(fence, counted, monkeypatch, text):
     with monkeypatch.context() as patch:
-        patch.setattr(CacheFile, "get", lambda *_: text)
+        patch.setattr(CacheFolder, "get", lambda *_: text)
         with rig.open(fence) as session:
             session.analyze()
     assert len(counted) == 4
@@ -165,7 +165,7 @@ def test_doctor_tells_the_size_and_forgets(fence, capsys):
     capsys.readouterr()
     main(["doctor"])
     line = next(one for one in capsys.readouterr().out.splitlines() if "kept results" in one)
-    assert str(CacheFile().folder) in line
+    assert str(CacheFolder().folder) in line
     assert " 5 of " in line  # four drops and their session
     main(["doctor", "--clear-cache"])
     assert "kept results: ok: 0 of " in capsys.readouterr().out
@@ -174,7 +174,7 @@ def test_doctor_tells_the_size_and_forgets(fence, capsys):
 def test_a_blind_session_keeps_no_numbers(tmp_path, capsys):
     text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
     path = record(tmp_path, f"{text}\nblind: true\n", "sim://?seed=3")
-    assert CacheFile().size().entries == 1
+    assert CacheFolder().size().entries == 1
     with rig.open(path) as session:
         hidden = session.analyze()
     assert not any("gravity_m_s2" in run.quantities for run in hidden.runs)

@@ -13,6 +13,7 @@ from rig.analysis.result import Measured
 from rig.cache.plain import from_text, to_text
 from rig.clock.calibration import TimeScale
 from rig.reasons import Reason, plain_reason
+from tests.examples import examples
 from tests.tables import cases
 
 SCALARS = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text()
@@ -47,6 +48,7 @@ def same(one, other):
         assert one == other
 
 
+@examples(40)
 @given(RECORDS)
 def test_what_is_read_is_what_was_written(record):
     same(from_text(to_text(record)), record)

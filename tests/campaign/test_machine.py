@@ -12,7 +12,6 @@ from rig.campaign.plan import (
     ATTEMPTS,
     CLOCK_S,
     CLOCK_U,
-    RunLine,
     describe_setup,
     job_to_judge,
     next_job,
@@ -22,6 +21,7 @@ from rig.campaign.voids import MANY, Void, after, in_common, voids_of, why_halte
 from rig.link.messages import RefusalReason
 from rig.protocol.protocol import Run
 from rig.reasons import make_reason, plain_reason
+from rig.recorder.run_lines import RunLine
 from rig.records import Job
 from rig.session.reading import StateEntry
 from rig.session.schema import RunState
@@ -62,15 +62,6 @@ def test_a_run_goes_from_the_protocol_to_its_verdict():
         on.Wait(5.0), on.ArmRelease(JOB), on.FireRelease(99), on.Collect(JOB), on.Judge(JOB),
         on.Log(JOB, "accepted", ()),
     ]  # fmt: skip
-
-
-def test_a_verdict_stays_until_it_is_in_the_file_and_acknowledged():
-    flow, _ = through(Flow(), *TO_RESULT)
-    assert step(flow, on.GoOn(NEXT))[0].stage is Stage.RESULT
-    flow, _ = through(flow, DONE, on.Tick(1e9), on.SessionOpen(), on.Found(NEXT))
-    assert flow.stage is Stage.RESULT
-    assert step(flow, on.GoOn(NEXT))[0].stage is Stage.PREPARE
-    assert step(flow, on.GoOn(None))[0].stage is Stage.DONE
 
 
 def test_a_rejection_keeps_notes_and_can_be_taken_back():
@@ -169,26 +160,11 @@ def test_only_what_was_armed_and_counted_down_without_a_stop_is_fired(happening,
         assert flow.ticket >= before.ticket
 
 
-def test_the_countdown_is_as_long_as_it_was_set():
-    flow = replace(Flow(stage=Stage.ARMING, job=JOB), countdown_s=0.5)
-    flow, effects = through(flow, on.EffectDone(0, 7), on.Tick(0.4))
-    assert effects == []
-    assert step(flow, on.Tick(0.11))[1] == (on.FireRelease(7),)
-
-
 PASSING = (RefusalReason.COOLING, RefusalReason.GATE_BLOCKED, RefusalReason.STOPPED)
 
 
 def arming(**more):
     return through(Flow(stage=Stage.PREPARE, **more), on.GoOn(JOB, 5.0), DONE)[0]
-
-
-@pytest.mark.parametrize("reason", [None, *RefusalReason])
-def test_whoever_is_there_begins_every_arming(reason):
-    flow, effects = through(arming(), on.EffectFailure(-1, "no\ndo this", reason, 100))
-    assert (flow.stage, flow.trouble, flow.job) == (Stage.PREPARE, "no\ndo this", JOB)
-    assert effects == ([] if reason in PASSING else [on.GiveUp()])
-    assert through(flow, DONE, on.Tick(9.0), on.SessionOpen()) == (flow, [])
 
 
 @pytest.mark.parametrize("reason", PASSING)
@@ -269,26 +245,6 @@ def test_three_voids_of_a_kind_halt_it(attended):
 def test_neither_the_plans_end_nor_another_attempt_passes_over_it(onward):
     flow, effects = through(voids(SKEW_CODE, SKEW_CODE, SKEW_CODE), onward)
     assert (flow.stage, effects) == (Stage.HALTED, [])
-
-
-def test_two_of_a_kind_or_three_of_others_do_not():
-    for reasons in ((SKEW_CODE, SKEW_CODE), (SKEW_CODE, "late_stamps", SKEW_CODE)):
-        assert through(voids(*reasons), on.GoOn(NEXT))[0].stage is Stage.PREPARE
-    flow, _ = through(
-        voids(SKEW_CODE, SKEW_CODE, SKEW_CODE), on.Reject("I moved a gate"), DONE, on.GoOn(NEXT)
-    )
-    assert flow.stage is Stage.PREPARE, "the operator knows why"
-
-
-def test_voids_that_others_logged_count_too():
-    row = voids(SKEW_CODE, SKEW_CODE).row
-    judged = on.DropVerdict(-1, "void", (skewed(9),), row)
-    flow, _ = through(Flow(stage=Stage.PREPARE), on.Found(Job(1, 3)), judged, DONE, on.GoOn(NEXT))
-    assert flow.stage is Stage.HALTED
-    judged = judged._replace(row=())
-    flow = voids(SKEW_CODE, SKEW_CODE)
-    flow, _ = through(flow, on.GoOn(NEXT), on.Found(Job(1, 3)), judged, DONE, on.GoOn(NEXT))
-    assert flow.stage is Stage.PREPARE
 
 
 def test_a_drop_that_fell_has_no_refusals_left():
@@ -396,6 +352,4 @@ def test_what_was_heard_of_since_the_log_was_read_counts_once(run_line):
 
 @pytest.fixture
 def run_line():
-    from rig.campaign.plan import RunLine
-
     return lambda run, attempt: RunLine(run, 0.0, "A", "B", attempt, "void")

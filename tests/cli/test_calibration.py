@@ -10,7 +10,7 @@ import pytest
 
 from rig.link import messages as wire
 from rig.link.frames import Decoder
-from rig.results import calibration
+from rig.results.whole import calibration
 from rig.session.store import Session
 from tests.cli.test_replay import tamper
 

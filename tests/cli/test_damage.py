@@ -12,7 +12,7 @@ from rig import door
 from rig.analysis.session import analyze
 from rig.errors import RigError
 from rig.records import ClockSample, HostBreak, Job, Pulse
-from rig.results import calibration, protocol_of
+from rig.results.whole import calibration, protocol_of
 from rig.session.store import Session
 from tests.session.altering import unguarded
 from tests.tables import cases

@@ -127,7 +127,7 @@ def test_runs_beyond_the_plan_are_refused(bring, exported, tmp_path):
         (exported / "edges.csv").read_text("utf-8") + "5,0,0.1,1\n7,0,0.1,1\n", "utf-8"
     )
     first, hint = refused(bring(events=events), tmp_path)
-    assert first.startswith(f"{events}: run 5 is not in the plan of ")
+    assert first.startswith(f"{events}: run 5 is not in the plan, which has ")
     assert first.endswith("which has 4 runs")
     assert hint.startswith("  hint: ")
 

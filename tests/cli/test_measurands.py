@@ -28,7 +28,7 @@ def added(monkeypatch):
     def compute(drop):
         if not drop.both:
             return None
-        speed = drop.model.protocol.gravity.value * (drop.hit - drop.release("free"))
+        speed = drop.model.protocol.gravity.value * (drop.arrival.when - drop.release("free"))
         return 0.5 * speed * speed
 
     monkeypatch.setitem(MEASURANDS, BLOW.name, BLOW)

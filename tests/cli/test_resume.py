@@ -19,7 +19,7 @@ from rig.ports import fill_url
 from rig.protocol import reader
 from rig.recorder.interrupts import Interrupts
 from rig.replay import replay
-from rig.results import calibration, results
+from rig.results.whole import calibration, results
 from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.cli.lab import (

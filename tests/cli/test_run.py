@@ -3,33 +3,15 @@
 import json
 import os
 import re
-import signal
-import subprocess
 from html import unescape
-from itertools import count
 
 import pytest
-from serial import SerialException
 
 from rig.analysis import drop as reading
 from rig.reasons import Reason
-from rig.replay import replay
-from rig.runner import Operator, run_protocol
 from rig.session.schema import RunState
 from rig.session.store import Session
-from sim.serial_port import SimulatedSerial
-from tests.cli.lab import (
-    ROOT,
-    assert_whole,
-    command,
-    drops_of,
-    log_of,
-    rig,
-    short,
-    short_fence,
-    truth_of,
-)
-from tests.waiting import PATIENCE_S
+from tests.cli.lab import assert_whole, drops_of, log_of, rig, short, truth_of
 
 MEASURED = ("separation_m", "separation_raw_m", "speed_m_s", "release_skew_s")
 
@@ -206,48 +188,6 @@ def test_a_session_that_was_moved_can_be_continued(call, tmp_path, fence):
     assert not old.exists()
 
 
-@pytest.fixture(scope="module")
-def reads(tmp_path_factory):
-    """How often the port is read in a campaign of two runs that nothing disturbs."""
-    folder, read, number = tmp_path_factory.mktemp("reads"), SimulatedSerial.read, count(1)
-    (folder / "short.yaml").write_text(short_fence(), "utf-8")
-
-    def counted(port, size=1):
-        next(number)
-        return read(port, size)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(SimulatedSerial, "read", counted)
-        run_protocol(
-            str(folder / "short.yaml"), "sim://", str(folder / "s"), Operator(lambda _: None)
-        )
-    return next(number) - 1
-
-
-@pytest.mark.parametrize("share", [0.3, 0.6, 0.9])
-def test_a_cable_that_is_pulled_costs_nothing_that_was_recorded(
-    run, tmp_path, monkeypatch, reads, share, fence
-):
-    read, number = SimulatedSerial.read, count(1)
-
-    def pull(port, size=1):
-        if next(number) > share * reads:
-            raise SerialException("read failed: [Errno 5] Input/output error")
-        return read(port, size)
-
-    monkeypatch.setattr(SimulatedSerial, "read", pull)
-    done = run("s", protocol=fence)
-    assert done.code == 4
-    assert done.err.splitlines()[-2].startswith("connection lost: read failed")
-    drops = drops_of(tmp_path / "s")
-    with Session.open(tmp_path / "s", readonly=True) as session:
-        assert replay(session).differences == ()
-    monkeypatch.undo()
-    assert run("s", protocol=fence).code == 0
-    assert drops_of(tmp_path / "s")[: len(drops)] == drops
-    assert_whole(tmp_path / "s", 2)
-
-
 def test_blocked_beams_that_nobody_clears_are_device_trouble(run, tmp_path):
     done = run(port="sim://?drop_error=12&seed=2")
     assert done.code == 4
@@ -276,34 +216,3 @@ def test_whoever_is_there_is_asked_before_each_drop(tmp_path, fence):
     finally:
         os.close(ours)
         os.close(terminal)
-
-
-def test_a_second_writer_is_refused_and_a_reader_is_not(call, tmp_path, fence):
-    """While a run is going on, at the speed of a real one."""
-    session = tmp_path / "s"
-    fence.write_text(short_fence(500), "utf-8")  # more than there is time for
-    run = ("run", fence, "--session", session, "--port")
-    writer = subprocess.Popen(
-        command(*run, "sim://?pace=1"), cwd=ROOT, stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    try:
-        assert writer.stderr is not None
-        assert writer.stderr.readline().split()[1] == "1/500"
-        reader = call("analyze", session, "--json")
-        second = call(*run, "sim://")
-        assert writer.poll() is None, "all this happened while it was being written"
-        assert reader.code == 0, reader.err
-        assert json.loads(reader.out)["runs"][0]["run"] == 1
-        assert second.code == 2
-        assert f"is being written by process {writer.pid}" in second.err
-        writer.send_signal(signal.SIGINT)
-        _, err = writer.communicate(timeout=PATIENCE_S)
-    finally:
-        writer.kill()
-        writer.wait()
-        for stream in (writer.stdout, writer.stderr):
-            stream.close()
-    assert writer.returncode == 130, err
-    with Session.open(session, readonly=True) as opened:
-        assert replay(opened).differences == ()

@@ -9,12 +9,11 @@ import pytest
 
 from bench.invariants import broken, longest_on
 from bench.process_fixture import ProcessFixture
-from rig.daemon.lease import LEASE_S, ControlError
-from rig.errors import InputError
+from rig.daemon.lease import LEASE_S
+from rig.errors import ControlError, InputError, StoppedError
 from rig.link.client import Device
 from rig.link.frames import Decoder
 from rig.link.messages import TABLE, Abort, DropCertificate2, Fire, Phase
-from rig.recorder.interrupts import StoppedError
 from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.daemon.at_work import states, working

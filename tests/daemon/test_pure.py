@@ -14,23 +14,25 @@ from hypothesis import strategies as st
 from bench.process_fixture import FENCE
 from rig.daemon import rpc
 from rig.daemon.client import Client, Line
-from rig.daemon.lease import LEASE_S, ControlError, Lease
+from rig.daemon.lease import LEASE_S, Lease
 from rig.daemon.listener import Door
 from rig.daemon.replica import Replica
 from rig.daemon.worker import Worker
 from rig.errors import (
+    ControlError,
     DeviceError,
     DeviceTimeoutError,
     DomainError,
     InputError,
     RigError,
     SessionError,
+    VersionError,
 )
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from rig.recorder.controller import Controller
-from rig.recorder.interrupts import Interrupts, StoppedError
+from rig.recorder.interrupts import Interrupts
 from rig.recorder.published import EDGES_LIMIT, PublishedState
 from tests.tables import cases
 from tests.waiting import PATIENCE_S
@@ -44,8 +46,8 @@ ERRORS = [
     DeviceRefusedError(RefusalReason.GATE_BLOCKED, 0b101),
     DeviceRefusedError(RefusalReason.NOT_ARMED, 0, DisarmReason.HOST_SILENT),
     ControlError("taken"),
-    make_error(StoppedError, "stopped", text="stopped by Ada"),
-    rpc.VersionError("old"),
+    rig_error("stopped", text="stopped by Ada"),
+    VersionError("old"),
 ]
 
 
@@ -262,15 +264,6 @@ def test_a_signal_waits_only_while_something_falls():
         assert client.call("collect") == {}
         with pytest.raises(KeyboardInterrupt):
             client.call(method)
-
-
-def test_a_protocol_without_gates_is_refused_and_leaves_no_session(tmp_path):
-    protocol, session = tmp_path / "g.yaml", tmp_path / "session"
-    before, _, after = FENCE.partition("gates:")
-    protocol.write_text(before + after[after.index("release:") :].replace("RUNS", "1"), "utf-8")
-    with pytest.raises(InputError, match="has no gates, so nothing can be measured"):
-        Controller("sim://", PublishedState()).open_session(str(protocol), str(session))
-    assert not session.exists()
 
 
 def test_a_session_that_is_closed_is_shown_to_nobody_any_more(tmp_path):

@@ -4,11 +4,9 @@ import threading
 
 import pytest
 
-from rig.daemon.lease import ControlError
-from rig.errors import InputError
+from rig.errors import ControlError, InputError, StoppedError
 from rig.link.messages import Phase, RefusalReason
 from rig.link.refusals import DeviceRefusedError
-from rig.recorder.interrupts import StoppedError
 from rig.replay import replay
 from rig.session.schema import RunState
 from rig.session.store import Session

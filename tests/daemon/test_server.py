@@ -18,7 +18,7 @@ from rig.daemon import connection, rpc, service
 from rig.daemon.client import AsyncClient, Client, Line
 from rig.daemon.listener import Door
 from rig.daemon.socket_path import default_socket, prepare_folder
-from rig.errors import DeviceError, InputError, RigError
+from rig.errors import BusyError, DeviceError, InputError, RigError, VersionError
 from tests.tables import cases
 from tests.waiting import PATIENCE_S
 
@@ -84,7 +84,7 @@ async def test_a_client_of_another_version_is_told_so_and_sent_away(door):
         skewed = rpc.request("hello", {"api": rpc.API + 1, "client": "t"}, 1)
         answer, end = await told(path, skewed, HELLO)
         error = rpc.error_of(answer)
-        assert isinstance(error, rpc.VersionError)
+        assert isinstance(error, VersionError)
         assert "version 2 of the daemon's interface" in str(error)
         assert end is None
 
@@ -119,7 +119,7 @@ async def test_an_endless_line_ends_the_connection_and_not_the_daemon(door):
 async def test_a_snapshot_has_every_section_that_is_promised(door):
     async with door() as (_server, path):
         client = await AsyncClient.connect(path, "tui")
-        await client.subscribe()
+        await client.call("subscribe")
         assert set(client.replica.state) == _SECTIONS
         assert client.replica.state["port"] == {
             "url": "sim://", "simulated": True, "path": "sim://",
@@ -138,7 +138,7 @@ async def test_a_client_that_does_not_read_costs_little_and_gets_a_snapshot_when
             await asyncio.sleep(0)
         (stuck,) = server.service.connections
         quick = await AsyncClient.connect(path, "quick")
-        await quick.subscribe()
+        await quick.call("subscribe")
         for number in range(400):
             server.published.set(error={"message": f"{number} " + "x" * 2000})
             server.service.publisher.spread()
@@ -242,7 +242,7 @@ def test_many_at_once_are_all_answered_or_told_that_it_is_busy(daemon):
         def come(number):
             try:
                 crowd.callback(Client(Line(path, f"client {number}")).close)
-            except rpc.BusyError:
+            except BusyError:
                 return 0
             return 1
 
@@ -261,7 +261,7 @@ def test_a_door_at_which_nobody_ever_looks_is_not_waited_at_for_ever(tmp_path, m
         deaf.bind(str(path))
         deaf.listen(0)
         waiting.connect(str(path))  # the kernel keeps one waiting
-        with pytest.raises(rpc.BusyError, match="it took no new client"):
+        with pytest.raises(BusyError, match="it took no new client"):
             Client(Line(path, "one more"))
 
 
@@ -270,7 +270,7 @@ async def test_beyond_the_last_client_stop_is_done_and_nothing_else(door, monkey
 
     async with door() as (server, path):
         clients = [await AsyncClient.connect(path, f"client {n}") for n in range(3)]
-        with pytest.raises(rpc.BusyError, match="any further client may only stop"):
+        with pytest.raises(BusyError, match="any further client may only stop"):
             await clients[2].call("subscribe")
         assert await clients[2].call("stop") == {}
         await clients[0].close()
@@ -302,7 +302,7 @@ NAMES = ["\ud800x", "\x1b[2J", "\u202etxt.exe", "a\nb", "\0", "ü" * 500]
 async def test_whatever_a_client_is_called_all_see_it(door):
     async with door() as (_server, path):
         watcher = await AsyncClient.connect(path, "watcher")
-        await watcher.subscribe()
+        await watcher.call("subscribe")
         for name in NAMES:
             client = await AsyncClient.connect(path, name)
             await client.call("take_control")

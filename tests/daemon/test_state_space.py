@@ -11,10 +11,9 @@ from contextlib import contextmanager
 
 import pytest
 
-from rig.errors import SessionError
+from rig.errors import SessionError, StoppedError
 from rig.link.messages import TEST_RUN, Arm, Phase, pack_label
 from rig.recorder.controller import Controller
-from rig.recorder.interrupts import StoppedError
 from rig.recorder.published import PublishedState
 from tests.daemon.rig_in_a_box import Box, Trouble
 

@@ -11,14 +11,14 @@ import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 from rig.cli import main
-from rig.errors import DeviceError, InputError
+from rig.errors import InputError
 from rig.flash import drive as drives
 from rig.flash import steps
 from rig.flash.boards import DRIVE, TARGETS
 from rig.flash.image import read_image, shipped_firmware
 from rig.link import messages as wire
 from rig.link.messages import RefusalReason
-from rig.reasons import make_error
+from rig.reasons import rig_error
 from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
 from tests.tables import cases
@@ -167,7 +167,7 @@ def test_a_port_that_udev_permits_a_little_later_is_waited_for(flash, tmp_path, 
 
 def test_a_port_that_stays_forbidden_is_said(flash, tmp_path, monkeypatch):
     picos(tmp_path, monkeypatch, "RPI-RP2")
-    refusal = make_error(DeviceError, "port_denied", port="/dev/ttyACM0", text="")
+    refusal = rig_error("port_denied", port="/dev/ttyACM0", text="")
     monkeypatch.setattr(steps, "open_port", Mock(side_effect=refusal))
     monkeypatch.setattr("os.access", lambda *_: False)
     monkeypatch.setattr(drives, "_RESTART_S", 0.2)

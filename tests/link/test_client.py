@@ -9,7 +9,6 @@ import pytest
 import serial
 from hypothesis import given
 from hypothesis import strategies as st
-from serial import SerialException
 
 from rig.boards import LONGEST_RECORD_MS
 from rig.clock.host import SystemClock
@@ -530,27 +529,6 @@ def test_what_is_no_address(url):
     with pytest.raises(DeviceError, match=f"cannot open {url}: ") as caught:
         open_port(url)
     assert "HOST:PORT" in caught.value.hint
-
-
-def test_no_such_computer(monkeypatch):
-    def nobody(*_args, **_kwargs):
-        raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
-
-    monkeypatch.setattr("socket.create_connection", nobody)
-    with pytest.raises(DeviceError, match="cannot open socket://nowhere"):
-        open_port("socket://nowhere.invalid:7000")
-
-
-def test_a_program_that_does_not_speak_rfc_2217(monkeypatch):
-    said = "Remote does not seem to support RFC2217"
-
-    def fail(_port):
-        raise SerialException(said)
-
-    monkeypatch.setattr("serial.rfc2217.Serial.open", fail)
-    with pytest.raises(DeviceError, match=f"cannot open rfc2217://lab:7: {said}") as caught:
-        open_port("rfc2217://lab:7")
-    assert "firewall" in caught.value.hint
 
 
 def test_a_missing_emulator_says_how_to_get_it(monkeypatch):

@@ -31,15 +31,7 @@ from tests.model.chains import (
     decades,
     even_chain,
 )
-from tests.model.reference import (
-    DIGITS,
-    exact_fall,
-    exact_gains,
-    exact_hits,
-    exact_leg,
-    exact_way,
-    reference_fall,
-)
+from tests.model.reference import exact_fall, exact_leg, exact_way, reference_fall
 
 # Twelve legs of a dozen roundings each: 12 × 12 × 2^-53 is 1.6e-14 were all of one sign.
 TIGHT = 1e-13
@@ -67,23 +59,6 @@ def test_a_speed_beyond_all_floats_is_refused():
     chain = Chain((1e300, 1e300, 1e-300), (0.0, 0.1, 0.2))
     with pytest.raises(DomainError, match="range of numbers"):
         fall(chain, 0.25, 0.0, 0.18, 9.81)
-
-
-@examples(80)
-@given(chains(), st.data(), GAMMAS, DROPS, GRAVITIES, SPEEDS)
-def test_every_impact_agrees_with_the_second_implementation(
-    chain, data, gamma, drop, gravity, speed
-):
-    alphas = data.draw(st.lists(ALPHAS, min_size=chain.rods, max_size=chain.rods))
-    events = hits(chain, kicks(chain, alphas, gamma), drop, gravity, speed)
-    with mp.workdps(DIGITS):
-        gains, still = exact_gains(chain.masses, alphas, gamma), [0] * chain.rods
-        wanted = exact_hits(chain.heights, gains, still, drop, gravity, speed)
-    for found, each in zip(events, wanted, strict=True):
-        for value, exact in zip(
-            (found.time_s, found.speed_before, found.speed_after), each, strict=True
-        ):
-            assert close(value, exact, TIGHT)
 
 
 TIGHT = 1e-13

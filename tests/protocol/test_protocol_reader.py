@@ -162,7 +162,7 @@ PIECES = [
 
 
 @given(st.integers(0, len(GOOD)), st.integers(0, 30), st.lists(st.sampled_from(PIECES), max_size=8))
-@examples(400)
+@examples(200)
 def test_a_damaged_protocol_never_gives_a_traceback(start, cut, pieces):
     text = GOOD[:start] + "".join(pieces) + GOOD[start + cut :]
     try:
@@ -173,7 +173,7 @@ def test_a_damaged_protocol_never_gives_a_traceback(start, cut, pieces):
 
 
 @given(st.sampled_from(READY), st.data())
-@examples(100)
+@examples(60)
 def test_what_is_no_yaml_is_said_in_words_and_shown_with_a_caret(path, data):
     text = path.read_text("utf-8")
     at = data.draw(st.integers(0, len(text) - 1))

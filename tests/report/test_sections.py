@@ -17,7 +17,7 @@ from rig.report.estimate import page_parts
 from rig.report.estimate_figures import estimate_pictures
 from rig.report.session_page import session_page
 from rig.report.templates import page_html
-from rig.results import complete_analysis, protocol_of, results
+from rig.results.whole import complete_analysis, protocol_of, results
 from rig.sections import Sections
 from rig.session.store import Session
 from rig.units import Quantity

@@ -7,10 +7,9 @@ import shutil
 import pytest
 
 import rig as door
-from rig.analysis.several import SessionPart, same_owners
 from rig.errors import InputError, SessionError
 from rig.protocol import reader
-from rig.results.together import results_together
+from rig.results.together import SessionPart, results_together, same_owners
 from rig.session.store import Session
 from tests.cli.conftest import call  # noqa: F401 - a fixture
 from tests.cli.lab import PROTOCOLS, record
@@ -53,13 +52,15 @@ def test_runs_of_both_count_in_one_mean_and_keep_their_sessions_names(two, call)
 
 
 def test_nothing_that_is_kept_is_used_where_that_is_asked_for(two, call, monkeypatch):  # noqa: F811
-    monkeypatch.setattr("rig.cache.store.CacheFile.get", None)
+    monkeypatch.setattr("rig.cache.store.CacheFolder.get", None)
     assert call("compare", *two, "--fresh").code == 0
 
 
 def test_what_one_rig_shares_is_one_unknown_and_of_two_rigs_there_are_two(two):
-    one = together(*two, same_rig=True).fit.joint.shared.blocks
-    each = together(*two, same_rig=False).fit.joint.shared.blocks
+    one, each = (
+        together(*two, same_rig=same).parts[0].analysis.joint.shared.blocks
+        for same in (True, False)
+    )
     assert {"beams", "datum", "drop", "clock"} <= set(one)
     assert {f"{name} ({place}.session)" for name in one for place in "ab"} == set(each)
 
@@ -69,7 +70,7 @@ def test_errors_of_one_rig_cancel_in_the_difference_of_its_sessions(tmp_path):
     (cancelled,) = together(first, other, same_rig=True).differences()
     (whole,) = together(first, other, same_rig=False).differences()
     assert cancelled.value.budget["common"] < 0.1 * whole.value.budget["common"]
-    summary = together(first, other, same_rig=False).fit.parts
+    summary = together(first, other, same_rig=False).parts
     means = [part.analysis.summary[0].means["gravity_m_s2"] for part in summary]
     assert whole.value.value == pytest.approx(means[1].value - means[0].value)
     commons = [mean.budget["common"] for mean in means]
@@ -80,15 +81,16 @@ def test_of_one_rig_only_what_is_stated_alike_is_shared():
     text = (PROTOCOLS / "inclined-uniform.yaml").read_text("utf-8")
     moved = re.sub(r"height: 22 mm", "height: 23 mm", text, count=1)
     assert moved != text
-    parts = [SessionPart(name, reader.parse(t), None) for name, t in (("a", text), ("b", moved))]
+    stated = reader.parse(text)
+    parts = [SessionPart(*part, None, None) for part in (("a", stated), ("b", reader.parse(moved)))]
     owners = same_owners(parts, same_rig=None)
     assert owners["beams"] == [["a"], ["b"]]
     assert owners["posts"] == owners["chain A"] == owners["start"] == [["a", "b"]]
     titled = reader.parse(text.replace("title: ", "title: Other "))
-    parts[1] = SessionPart("b", titled, None)
+    parts[1] = SessionPart("b", titled, None, None)
     assert same_owners(parts, same_rig=None)["posts"] == [["a"], ["b"]]
     assert same_owners(parts, same_rig=True)["posts"] == [["a", "b"]]
-    parts[1] = SessionPart("b", parts[0].protocol, None, board="another")
+    parts[1] = SessionPart("b", stated, None, None, board="another")
     assert same_owners(parts, same_rig=None)["posts"] == [["a"], ["b"]]
 
 

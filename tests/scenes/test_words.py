@@ -128,7 +128,7 @@ def test_dialogs_speak_the_words_of_their_scene(recorded, monkeypatch):
         app.follower.look_with(live)
         texts = {}
         async with app.run_test(size=(120, 60)) as pilot:
-            while app.view is None or not app.page:
+            while app.follower.view is None or not app.page:
                 await pilot.pause(0.02)
             for name in DIALOGS:
                 stage = Stage.PREPARE if name == "release_test" else Stage.RESULT

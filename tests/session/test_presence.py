@@ -204,15 +204,3 @@ def test_a_session_that_another_writes_costs_no_descriptor(tmp_path):
         with pytest.raises(SessionError, match="is being written by process"):
             Session.open(session)
         assert open_files() == held
-
-
-def test_a_port_that_is_not_there_leaves_no_session_in_the_way(tmp_path):
-    protocol, session = tmp_path / "fence.yaml", tmp_path / "session"
-    protocol.write_text(FENCE.replace("RUNS", "1"), "utf-8")
-    real = Controller(str(tmp_path / "ttyACM0"), PublishedState())
-    with pytest.raises(DeviceError, match="no such port"):
-        real.open_session(str(protocol), str(session))
-    assert [one.name for one in tmp_path.iterdir()] == [protocol.name]
-    simulated = Controller("sim://", PublishedState())
-    simulated.open_session(str(protocol), str(session))
-    simulated.close()

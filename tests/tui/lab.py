@@ -178,7 +178,9 @@ class Lab:
             await operator.until(lambda: operator.app.desk.chosen)
             await operator.press("enter")
             await operator.at(Stage.DEVICE)
-            await operator.until(lambda: operator.app.view and operator.app.indicators.known)
+            await operator.until(
+                lambda: operator.app.follower.view and operator.app.follower.indicators.known
+            )
             await operator.press("enter")
             await operator.at(Stage.PREPARE)
             yield operator

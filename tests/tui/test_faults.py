@@ -88,7 +88,7 @@ async def session_on(op):
     await op.until(lambda: op.app.client.driving and op.app.follower.state.link == "up")
     await op.press("enter")
     await op.at(Stage.DEVICE)
-    await op.until(lambda: op.app.view and op.app.indicators.known)
+    await op.until(lambda: op.app.follower.view and op.app.follower.indicators.known)
 
 
 async def test_a_pulled_cable_is_said_on_every_screen(cabled):

@@ -47,7 +47,9 @@ async def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(monkeyp
         app.desk.rows = []  # as before it has looked around
         await press("enter")
         await op.at(Stage.DEVICE)
-        await op.until(lambda: app.view and app.indicators.known and app.client.driving)
+        await op.until(
+            lambda: app.follower.view and app.follower.indicators.known and app.client.driving
+        )
         await press("enter")
         await op.at(Stage.PREPARE)
         await op.sees("Run 1 of 10", "Enter arms")
@@ -217,12 +219,12 @@ async def test_a_protocol_and_stop_are_clicked(lab, fence):
 
         await op.until(chosen)
         stopped = []
-        real = op.app.client.call
+        real = op.app.client.connection.call
 
         async def call(method, **params):
             stopped.append(method)
             return await real(method, **params)
 
-        op.app.client.call = call
+        op.app.client.connection.call = call
         await click(op, "app.do('stop')")
         await op.until(lambda: "stop" in stopped)

@@ -101,7 +101,7 @@ async def _screens(moment, sizes, path, look, themes=THEME_NAMES[:1]):
     app.driver.flow = flow
     found = []
     async with app.run_test(size=sizes[0]) as pilot:
-        while app.view is None or not app.indicators.known:
+        while app.follower.view is None or not app.follower.indicators.known:
             await pilot.pause()
         if moment == "help":
             await pilot.press("question_mark")

@@ -124,7 +124,7 @@ async def test_a_blind_session_shows_its_numbers_when_it_is_unblinded(lab):
             await op.press(page)
             await op.until(lambda page=page: op.app.action_of[page] == f"page_{op.app.page}")
             assert "± 0" not in text_of(op.app)
-            assert not op.app.view.drops[op.app.view.jobs[0]].edges
+            assert not op.app.follower.view.drops[op.app.follower.view.jobs[0]].edges
         await op.until(lambda: op.app.flow.logged)
         await op.press("4", "b")
         await op.means()
@@ -135,7 +135,7 @@ async def test_a_blind_session_shows_its_numbers_when_it_is_unblinded(lab):
 
 async def test_a_second_screen_watches_and_can_only_stop(lab):
     async with lab.ready(countdown_s=600.0) as op, lab.operator(name="the other") as other:
-        await other.until(lambda: other.app.view)
+        await other.until(lambda: other.app.follower.view)
         assert not other.app.client.driving
         await op.arms(Stage.COUNTDOWN)
         await other.sees("ARMED by another client", "watching rig tui")

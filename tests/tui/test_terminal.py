@@ -1,4 +1,4 @@
-"""A whole ABBA session by keys alone in a real terminal."""
+"""A whole session by keys alone in a real terminal."""
 
 import asyncio
 import os
@@ -43,9 +43,9 @@ class Terminal:
         return done.stdout
 
     def begins(self, url: str) -> Path:
-        """Open a new session of four runs and come to the first; return its file."""
-        protocol, session = self.folder / "abba.yaml", self.folder / "abba.session"
-        protocol.write_text(short("[40 deg]", 4), "utf-8")
+        """Open a new session of two runs and come to the first; return its file."""
+        protocol, session = self.folder / "keys.yaml", self.folder / "keys.session"
+        protocol.write_text(short("[40 deg]", 2), "utf-8")
         self.tmux(
             "new-session", "-d", "-x", "100", "-y", "30", "-c", str(ROOT),
             sys.executable, "-m", "rig", "tui", str(protocol), "--port", url, "--session",
@@ -85,7 +85,7 @@ class Terminal:
             screen = self.screen()
             if "nothing fell" in screen and "Enter arm" in screen:
                 self.enters("Enter arm")
-            return all(text in screen for text in (f"Run {number} of 4", " wins by "))
+            return all(text in screen for text in (f"Run {number} of 2", " wins by "))
 
         self.enters("Enter arm")
         until(fell, lambda: self.tmux("capture-pane", "-p"))
@@ -112,26 +112,26 @@ def terminal() -> Iterator[Terminal]:
 @pytest.mark.parametrize(
     "url", ["sim://?seed=3", pytest.param("emu://?seed=3", marks=pytest.mark.slow)]
 )
-def test_an_abba_session_by_keys_alone(terminal, url):
+def test_a_session_by_keys_alone(terminal, url):
     if url.startswith("emu"):
         pytest.importorskip("rig_emulator.stand")
     session = terminal.begins(url)
-    for number, chain in enumerate("ABBA", start=1):
-        terminal.sees(f"Run {number} of 4", f"chain {chain} strikes", "Still ✓", "Enter arm")
+    for number, chain in enumerate("AB", start=1):
+        terminal.sees(f"Run {number} of 2", f"chain {chain} strikes", "Still ✓", "Enter arm")
         if number == 2:  # typed and pasted: neither words nor the Enter behind them arm
             terminal.press("-l", "hm u\r\r\r")
             terminal.sees("not armed: Enter came too soon after another key")
-            terminal.sees("Run 2 of 4", "Enter arm")
+            terminal.sees("Run 2 of 2", "Enter arm")
         terminal.drops(number)
         terminal.enters("RESULT")
-    terminal.sees("4 of 4 runs", "✓✓✓✓")
+    terminal.sees("2 of 2 runs", "✓✓")
     pid = _daemon_of(terminal.folder)
     terminal.press("q")
     terminal.sees("Quit?")
     terminal.enters("Quit?")
     os.kill(pid, 0)  # it is there without the screen
     os.kill(pid, signal.SIGTERM)
-    assert_whole(session, 4)
+    assert_whole(session, 2)
 
 
 def test_keys_have_one_reader_after_the_program_was_stopped(monkeypatch):

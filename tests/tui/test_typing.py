@@ -70,6 +70,10 @@ class Rig(FakeClient):
         super().__init__(state)
         self.told = []
 
+    @property
+    def connection(self):
+        return self
+
     async def call(self, method, **params):
         self.told.append((time.monotonic(), method))
         await (asyncio.Event().wait() if method == "collect" else asyncio.sleep(0))
@@ -238,6 +242,6 @@ async def _screen(session):
     app = RigApp(Options(session=session, countdown_s=0.3, still_s=STILL_S), KEYS, rig)
     async with app.run_test(size=SIZE) as pilot:
         rig.changed = True
-        while not app.page or app.view is None:
+        while not app.page or app.follower.view is None:
             await pilot.pause(0.01)
         yield app, pilot

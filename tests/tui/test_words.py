@@ -38,7 +38,7 @@ def model(text):
     state = {"port": {"url": text, "simulated": True}, "session": {"title": text, "path": text},
              "control": {"client": text}, "link": {"state": "up"}}  # fmt: skip
     flow = Flow(Stage.RESULT, Job(1, 1), verdict="void", reasons=(plain_reason(text),))
-    return Model(read_state(0, state), flow, Indicators(), connected=True, port=text)
+    return Model(read_state(state), flow, Indicators(), connected=True, port=text)
 
 
 @pytest.mark.parametrize("text", NASTY, ids=range(len(NASTY)))
@@ -94,20 +94,19 @@ STATE = {
 
 
 def test_what_the_daemon_does_not_know_is_not_known():
-    state = read_state(0, STATE | {"gates": None, "runs": None, "edges": None})
+    state = read_state(STATE | {"gates": None, "runs": None, "edges": None})
     assert state.blocked_mask is None
     assert (state.runs, state.edges, state.holder) == ((), (), None)
-    assert DaemonState().n < 0 <= state.n
 
 
 def test_a_state_once_taken_never_changes():
     replica = Replica()
     replica.follow("snapshot", copy.deepcopy({"n": 7, "state": STATE}))
-    taken = read_state(replica.n, replica.state)
+    taken = read_state(replica.state)
     as_it_was = copy.deepcopy(taken)
     changes = {"set": {"gates": {"blocked": 9}}, "runs": [RUN | {"state": "void"}]}
     replica.follow("change", {"n": 8, "edges": [[1, 2, 1]], **changes})
-    assert taken == as_it_was != read_state(replica.n, replica.state)
+    assert taken == as_it_was != read_state(replica.state)
 
 
 def test_indicators_count_name_and_judge_steadiness():
@@ -130,7 +129,7 @@ def test_a_gate_that_is_blocked_from_the_beginning_has_not_changed():
 
 
 def _model(state=None, **more):
-    return Model(read_state(0, STATE | (state or {})), Flow(), Indicators(), connected=True, **more)
+    return Model(read_state(STATE | (state or {})), Flow(), Indicators(), connected=True, **more)
 
 
 def test_what_is_wrong_is_said_with_what_to_do():
@@ -162,10 +161,10 @@ def test_a_port_that_is_back_before_anybody_looked_was_lost_all_the_same():
     line._note(replica)
     replica.follow("change", {"n": 2, "set": {"link": {"state": "up"}}})
     line._note(replica)
-    assert not [*_back(line, read_state(replica.n, replica.state))]  # not all is well yet
+    assert not [*_back(line, read_state(replica.state))]  # not all is well yet
     replica.follow("change", {"n": 3, "set": {"error": None}})
     line._note(replica)
-    back = read_state(replica.n, replica.state)
+    back = read_state(replica.state)
     (said,) = _back(line, back)
     assert said.trouble == "the port was lost and is back: the board restarted\ncheck its supply"
     assert not [*_back(line, back)]
@@ -272,7 +271,7 @@ def test_terminal_and_locale_say_when(environment, is_ascii):
 
 
 async def test_a_whole_screen_is_ascii():
-    app = RigApp(Options(ascii=True), KEYS, FakeClient(DaemonState(0, QUIET)))
+    app = RigApp(Options(ascii=True), KEYS, FakeClient(DaemonState(QUIET)))
     app.driver.flow = Flow(Stage.DEVICE)
     async with app.run_test(size=(80, 24)) as pilot:
         while "DEVICE" not in text_of(app):
