@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from rig.analysis.annealing import LEAST
 from rig.analysis.budgets import Budgets
 from rig.analysis.chain_records import ChainRecord, chain_records, thin
 from rig.analysis.components import Components, priors
-from rig.analysis.diagnoses import FEW_GATES, gates_too_low, silent
+from rig.analysis.diagnoses import gates_too_low, silent, suspects
 from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
-from rig.analysis.explanations import Explainer, name_fault
-from rig.analysis.faults import Premise
+from rig.analysis.explanations import Explainer
+from rig.analysis.faults import Premise, Suspects
 from rig.analysis.fit import Begun, DropFit, Fit, refit_at_rate, settle
 from rig.analysis.gravity import free_gravity
 from rig.analysis.identify import DropIdentity, identify, pattern_faults
 from rig.analysis.joint_fit import by_itself
 from rig.analysis.last_passages import last_passages
 from rig.analysis.result import GOOD, Audit, Deviation, DropResult
-from rig.analysis.verdict import judge, judge_record, verdict_of
+from rig.analysis.verdict import is_wrong, judge, judge_record, verdict_of
 from rig.arrays import Array
 from rig.clock.calibration import TimeScale
 from rig.protocol.contact import at_contact
@@ -32,7 +31,6 @@ from rig.protocol.protocol import Protocol, Run
 from rig.reasons import Reason, make_reason
 from rig.records import Drop
 from rig.threads import one_thread
-from rig.wordings import Severity
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +158,7 @@ class DropCase:
             case = replace(case, aside=(*case.aside, *low))
             begun = case._identify(readings, begun).begun
             without = result, _ = case._judge(readings, explain=False)
-            if not _wrong(result.reasons):
+            if not is_wrong(result.reasons):
                 return without
         return stated._judge(readings, explain=explain)
 
@@ -196,9 +194,8 @@ class DropCase:
         about = self.protocol, self.records, self.scale.u, self.components
         identification = identify(*about, -math.inf if self.drop.fire_tick is None else 0.0)
         unlike = pattern_faults(identification, self.protocol.vocabulary)
-        poor = tuple(role for role, share in identification.shares.items() if share < LEAST)
         fit = None if unlike else identification.fit
-        return DropIdentity(self.scale, unlike, poor, fit.begun if fit else None)
+        return DropIdentity(self.scale, unlike, fit.begun if fit else None)
 
     def _judge(
         self, readings: dict[tuple[int, ...], DropIdentity], *, explain: bool
@@ -233,14 +230,10 @@ class DropCase:
             reasons = (make_reason("no_fall", protocol.vocabulary),)
             return DropResult(run, drop.attempt, "void", reasons, audit), None
         by_passages = last_passages(fit)
-        end = judge(protocol, run, drop, audit, measured, fit, by_passages, unmatched)
-        reasons = end.reasons
-        if not end.known and (explain if _wrong(reasons) else verdict_of(reasons) != "void"):
-            explainer = self._explainer(self.scale, end.suspects)
-            if end.odd or explainer.suggests_fault(fit):
-                causes = [cause for cause in explainer.explain(fit) if cause.whole]
-                if why := name_fault(causes, protocol.vocabulary, end.accused):
-                    reasons = (*(one for one in reasons if one not in end.accused), *why)
+        reasons = judge(fit, run, drop, audit, measured, by_passages, unmatched)
+        if explain if is_wrong(reasons) else verdict_of(reasons) != "void":
+            explainer = self._explainer(self.scale, suspects(records, fit.matches))
+            reasons = explainer.name_fault(fit, reasons)
         result = DropResult(
             run,
             drop.attempt,
@@ -258,24 +251,13 @@ class DropCase:
 
     def _unlike_fall(self, reading: DropIdentity) -> tuple[Reason, ...]:
         """Return set-up faults that would explain edges that match no fall."""
-        assert self.protocol.gates is not None
-        gates = self.protocol.gates.gates
-        strange = [n for n, gate in enumerate(gates) if gate.side in reading.poor]
-        if not strange and len(gates) <= FEW_GATES:
-            strange = [*range(len(gates))]  # gates may see nearly the same edges
-        causes = self._explainer(reading.scale, strange).explain(None)
-        return tuple(name_fault(causes, self.protocol.vocabulary))
+        explainer = self._explainer(reading.scale, suspects(self.records))
+        return explainer.name_fault(None)
 
-    def _explainer(self, scale: TimeScale, suspects: Sequence[int]) -> Explainer:
+    def _explainer(self, scale: TimeScale, suspects: Suspects) -> Explainer:
         assert self.components is not None
         premise = Premise(self.protocol, self.run, scale.hz, self.aside)
         return Explainer(premise, thin(self.drop, scale.hz), scale.u, self.components, suspects)
-
-
-def _wrong(reasons: Iterable[Reason]) -> bool:
-    """Whether a drop is void for more than its release skew, which other gates would not mend."""
-    void = {reason.code for reason in reasons if reason.severity is Severity.VOID}
-    return bool(void - {"release_skew"})
 
 
 def _blank_audit(drop: Drop, records: Sequence[ChainRecord]) -> Audit:

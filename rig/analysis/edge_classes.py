@@ -8,7 +8,7 @@ a rebounding rod, a later passage of the object, or unexplained.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -20,7 +20,7 @@ from rig.analysis.fit import Fit
 from rig.analysis.joint_step import JointDrop
 from rig.analysis.plain_data import attributes
 from rig.analysis.trajectory import Trajectory
-from rig.arrays import Array, Index
+from rig.arrays import Array, Flags, Index
 
 EdgeClass = Literal[
     "missed",
@@ -90,25 +90,28 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
     """
     model, x = drop.model, drop.x
     assert model.protocol.gates is not None
-    clock, gates = model.rate(x), model.protocol.gates.gates
+    clock, gates, gravity = model.rate(x), model.protocol.gates.gates, model.protocol.gravity.value
     unmatched: list[UnmatchedEdge] = []
     for role, record in model.records.items():
-        path = model.trajectory(role, x)
+        path, none = model.trajectory(role, x), np.zeros(0, dtype=np.intp)
         lowest = min(gates[train.gate].height for train in record.trains)
         due = path.times(model.all_levels(role, x)) / clock
         for train, expected, match in record.by_gate(drop.matches[role]):
             gate = gates[train.gate]
-            # Only the lowest beam is within reach of rebounding rods.
-            near = gate.height == lowest and record.ratios is not None
-            hit = float(path.time[1]) / clock if near else np.inf
             if (match < 0).any():
                 unmatched += _absent(gate.channel, train, match, due[expected])
             if train.times.size > (match >= 0).sum():
-                back = later_passages(record, train, match, path, model.protocol.gravity.value)
-                unmatched += _surplus(gate.channel, train, match, hit, back)
+                # Only the lowest beam is within reach of rebounding rods.
+                near = gate.height == lowest and record.ratios is not None
+                classes: dict[EdgeClass, Flags] = {
+                    "string": train.burst > 0.0,
+                    "later passage": _later_passages(record, train, match, path, gravity),
+                    "bounce": train.times > (float(path.time[1]) / clock if near else np.inf),
+                }
+                unmatched += _surplus(gate.channel, train, match, classes)
         for train in record.aside:
-            channel, edges = gates[train.gate].channel, range(train.times.size)
-            unmatched += [_received_edge("left out", channel, train, at, None, 0.0) for at in edges]
+            classes = {"left out": train.burst >= 0.0}
+            unmatched += _surplus(gates[train.gate].channel, train, none, classes)
     return tuple(sorted(unmatched, key=lambda edge: edge.time_s))
 
 
@@ -124,86 +127,57 @@ def _absent(
 
     If a rod is missed the beam stays bright; if a gap between rods is missed it stays dark.
     """
+    # Before the first edge, the place −1 is that of a bright beam.
+    dark = np.append(train.blocked, False)[np.searchsorted(train.times, expected) - 1]
     for at in np.flatnonzero(match < 0).tolist():
-        when, before = float(expected[at]), int(np.searchsorted(train.times, expected[at]))
-        kind: EdgeClass = "merged" if before and train.blocked[before - 1] else "missed"
-        kind = kind if train.times.size else "dead gate"
+        kind: EdgeClass = "merged" if dark[at] else "missed" if train.times.size else "dead gate"
         blocks, rod = bool(train.blocks[at]), int(train.rods[at])
-        yield UnmatchedEdge(kind, channel, when, blocks, rod, None, ABSENT)
-
-
-def _received_edge(
-    kind: EdgeClass, channel: int, train: EdgeTrain, at: int, rod: int | None, cost: float = SURPLUS
-) -> UnmatchedEdge:
-    """Return the unmatched edge for number `at` of a train."""
-    when, blocked, edge = float(train.times[at]), bool(train.blocked[at]), int(train.edge[at])
-    return UnmatchedEdge(kind, channel, when, blocked, rod, edge, cost)
+        yield UnmatchedEdge(kind, channel, float(expected[at]), blocks, rod, None, ABSENT)
 
 
 def _surplus(
-    channel: int, train: EdgeTrain, match: Index, hit: float, back: set[int]
+    channel: int, train: EdgeTrain, match: Index, classes: Mapping[EdgeClass, Flags]
 ) -> Iterator[UnmatchedEdge]:
-    """Yield the observed edges of a gate that belong to no rod."""
+    """Yield the observed edges of a gate that belong to no rod, with the first class that holds.
+
+    Chatter comes before all others: an edge in the same flicker as that of a rod.
+    """
     rods = np.full(train.times.size, -1)
-    rods[match[match >= 0]] = train.rods[match >= 0]
+    rods[match[match >= 0]] = train.rods[: match.size][match >= 0]
     # Edges within `QUICK` of each other belong to the same flicker, and share its number.
     flicker = np.cumsum(np.diff(train.times, prepend=-np.inf) > QUICK)
     for at in np.flatnonzero(rods < 0).tolist():
         near = rods[(flicker == flicker[at]) & (rods >= 0)]
-        kinds: dict[EdgeClass, bool] = {
-            "chatter": bool(near.size),
-            "string": bool(train.burst[at] > 0.0),
-            "later passage": at in back,
-            "bounce": bool(train.times[at] > hit),
-        }
-        kind = next((kind for kind, holds in kinds.items() if holds), UNEXPLAINED)
-        yield _received_edge(kind, channel, train, at, int(near[0]) if near.size else None)
+        kind = next((kind for kind, holds in classes.items() if holds[at]), UNEXPLAINED)
+        kind, rod = ("chatter", int(near[0])) if near.size else (kind, None)
+        when, blocked, edge = float(train.times[at]), bool(train.blocked[at]), int(train.edge[at])
+        cost = 0.0 if kind == "left out" else SURPLUS
+        yield UnmatchedEdge(kind, channel, when, blocked, rod, edge, cost)
 
 
-def later_passages(
+def _later_passages(
     record: ChainRecord, train: EdgeTrain, match: Index, path: Trajectory, gravity: float
-) -> set[int]:
-    """Return the edges of a single object's later passages of a gate after it rebounded.
+) -> Flags:
+    """Return which edges are a single object's later passages of a gate after it rebounded.
 
     The object rises through a gate and falls through it again, with at most the energy of its first
     passage at speed v. So each shadow lasts at least width/v, and the second of a pair follows the
     first within the flight time 2v/g. Neither holds for a pendulum, whose half period is longer,
     nor for edges of lower gates on the same channel. The last shadow may be single: the object
-    turned in the beam, or the recording ended.
-
-    Parameters
-    ----------
-    record, train, match
-        The chain, a gate of it, and its observed edge for every expected edge (−1: none).
-    path
-        Trajectory of the chain.
-    gravity
-        Acceleration of a free fall, or down the track, m/s².
-
-    Returns
-    -------
-    set of int
-        Numbers of the edges in the train; empty for a chain, where surplus rods would look alike.
+    turned in the beam, or the recording ended. Of a chain, surplus rods would look alike.
     """
+    times, dark, back = train.times, train.blocked, np.zeros(train.times.size, dtype=np.bool_)
     if record.ratios is not None or record.chain.chain.rods > 1 or not (match >= 0).any():
-        return set()
-    times, later = train.times, np.arange(int(match.max()) + 1, train.times.size)
-    speed = float(path.heights(times[[match.max()]])[1][0])
-    if train.blocked.all():  # the timer records no ends of shadows
-        begins = ends = later
-    else:
+        return back
+    first, speed = match.max(), float(path.heights(times[[match.max()]])[1][0])
+    begins = ends = np.arange(first + 1, times.size)
+    if not dark.all():  # else the timer records no ends of shadows
         # Each shadow begins as the beam darkens and ends with the next edge.
-        begins = later[:-1][train.blocked[later[:-1]] & ~train.blocked[later[1:]]]
-        slow = np.diff(times)[begins] * speed * WIDER >= min(record.chain.widths)
-        begins = begins[slow]
+        shadow = (
+            dark[:-1] & ~dark[1:] & (np.diff(times) * speed * WIDER >= min(record.chain.widths))
+        )
+        begins = begins[:-1][shadow[first + 1 :]]
         ends = begins + 1
-    flight = 2.0 * speed * WIDER / gravity
-    back: set[int] = set()
-    at = 0
-    while at < begins.size:
-        pair = at + 1 < begins.size and times[begins[at + 1]] - times[ends[at]] < flight
-        if pair or at + 1 == begins.size:
-            shadows = slice(at, at + 1 + pair)
-            back |= {*begins[shadows].tolist(), *ends[shadows].tolist()}
-        at += 1 + pair
+    paired = times[begins[1:]] - times[ends[:-1]] < 2.0 * speed * WIDER / gravity
+    back[begins] = back[ends] = np.append(paired, True) | np.append(False, paired)
     return back

@@ -1,9 +1,9 @@
 """Search for the set-up fault that explains a drop, by comparison of marginal likelihoods.
 
 If a drop cannot be identified, or fits badly, its set-up may have a single fault. A fault with a
-size (longer chain, another drop height, higher post, slow clock …) is a direction of the unknowns:
-a score test selects candidates, and the size is fitted with all other unknowns. A fault without a
-size (exchanged gates, wrong number of rods …) is another protocol, with which the edges are
+continuous size (longer chain, another drop height, higher post, slow clock …) is a direction of the
+unknowns: a score test selects candidates, and the size is fitted with all other unknowns. Any other
+fault (exchanged gates, wrong number of rods …) is another protocol, with which the edges are
 identified anew. Both compete by marginal likelihood with the stated protocol. Each fault has a
 prior probability and a range of sizes. The rivals of a fault are all others, and a fall that
 departs from the equations. Only a fault with clear odds against all rivals is named.
@@ -12,18 +12,18 @@ departs from the equations. Only a fault with clear odds against all rivals is n
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from rig.analysis.annealing import LEAST, MISSED
+from rig.analysis.annealing import MISSED
 from rig.analysis.chain_records import ChainRecord, chain_records
 from rig.analysis.components import Components
 from rig.analysis.diagnoses import RIGHT
-from rig.analysis.faults import Fault, Premise, faults
+from rig.analysis.faults import Fault, Premise, Suspects, faults
 from rig.analysis.fit import Fit, settle
 from rig.analysis.identify import (
     Reading,
@@ -40,19 +40,22 @@ from rig.analysis.unknowns import prior_air
 from rig.arrays import Array
 from rig.reasons import Reason, make_reason
 from rig.records import Drop
-from rig.vocabulary import Vocabulary
 
 CLEAR = math.log(100.0)
 """Least log odds of a named fault against every rival and the stated protocol. Also the cost of a
 fault's prior probability: 1 drop in 100 has a given fault."""
 _NAMED = 3  # faults listed if none is clear
-_TRIED = 4  # faults that are fitted: those with the most votes
+_TRIED = 5  # faults that are fitted: those with the largest score, and those with the most votes
 _BEYOND = 10.0  # factor on the prior of the stretch, in a fall that departs from the equations
-_LEFT = 12.5  # largest gain of a further fault if a fault explains the drop: 5 σ
 
 
-NEITHER = Fault("")
-"""Rival hypothesis: no fault, but a fall that departs from the equations."""
+_NEITHER = Fault("", lambda stated, _: stated)
+"""Rival hypothesis: no fault, in a fall by the equations or in one that departs from them."""
+_ACCUSING = {
+    *("gate_disagrees", "gate_disagrees_few", "gate_off", "air", "air_accelerates"),
+    "other_incline",
+}
+"""Reasons that blame gates, air or surface; a fault that is named takes their place."""
 
 
 class Explanation(NamedTuple):
@@ -64,16 +67,16 @@ class Explanation(NamedTuple):
         The fault.
     values
         Values of the reason that names it.
-    log_odds
-        Log odds against the stated protocol.
+    evidence
+        Log marginal likelihood with the fault, less the cost of its prior probability.
     whole
         Whether it explains nearly all edges.
     """
 
     fault: Fault
-    values: dict[str, Any]
-    log_odds: float
-    whole: bool
+    values: Mapping[str, Any]
+    evidence: float
+    whole: bool = True
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,7 @@ class Explainer:
 
     Attributes
     ----------
-    setting
+    stated
         Premise as stated.
     drop
         The raw record.
@@ -91,89 +94,121 @@ class Explainer:
     components
         Variance components.
     suspects
-        Numbers of the gates of which any two may be exchanged.
+        Gates and rods that the edges cast doubt on.
     """
 
-    setting: Premise
+    stated: Premise
     drop: Drop
     clock_u: float
     components: Components
-    suspects: Sequence[int]
+    suspects: Suspects
     _votes: dict[Hashable, int] = field(default_factory=dict)
     """Cache of a side's votes: a fault of a side does not change those of the other."""
 
     @cached_property
     def _faults(self) -> tuple[list[Fault], list[Fault]]:
-        """Faults with a size that is fitted, and faults without."""
+        """Faults of a continuous size, and all others."""
         kinds: tuple[list[Fault], list[Fault]] = [], []
-        for fault in faults(self.setting.protocol, self.setting.run, self.suspects):
-            kinds[fault.shift is None].append(fault)
+        for fault in faults(self.stated, self.suspects):
+            kinds[not fault.continuous].append(fault)
         return kinds
 
-    def suggests_fault(self, fit: Fit) -> bool:
-        """Whether the score test of a fitted drop favours a fault."""
-        return bool((self._gains(fit)[0] > CLEAR).any())
-
-    def explain(self, fit: Fit | None) -> list[Explanation]:
-        """Return the faults that are likelier than none, the likeliest first.
+    def name_fault(self, fit: Fit | None, reasons: Sequence[Reason] = ()) -> tuple[Reason, ...]:
+        """Return reasons with the one that names the clear fault, or lists the likeliest.
 
         Parameters
         ----------
         fit
             Fit with the stated protocol; `None` if the drop was not identified.
+        reasons
+            Reasons about the drop; those that accuse gates, air or surface give way to the fault.
         """
+        if fit is not None and not self._is_odd(fit, reasons):
+            return (*reasons,)
+        causes = [cause for cause in self._explain(fit) if cause.whole or fit is None]
+        # A fault found by score and by votes counts once.
+        ranked = [*{id(cause.fault): cause for cause in sorted(causes, key=_evidence)}.values()]
+        ranked.sort(key=_evidence, reverse=True)
+        neither = next(cause.evidence for cause in ranked if cause.fault is _NEITHER)
+        if ranked[0].evidence < neither + CLEAR:
+            return (*reasons,)
+        best, rival, *_ = ranked
+        words, lead = self.stated.protocol.vocabulary, best.evidence - rival.evidence
+        if best.whole and lead > CLEAR:
+            why = make_reason(best.fault.code, words, **best.values, log_odds=lead)
+        else:
+            likely = [cause for cause in ranked if cause.evidence > neither][:_NAMED]
+            candidates = [{"code": cause.fault.code, "values": cause.values} for cause in likely]
+            why = make_reason("unclear_fault", words, candidates=candidates)
+        return (*(reason for reason in reasons if reason.code not in _ACCUSING), why)
+
+    def _is_odd(self, fit: Fit, reasons: Sequence[Reason]) -> bool:
+        """Whether a fault is searched for, which takes longer than all the rest."""
+        if any(reason.code in _ACCUSING for reason in reasons) or not well_read(fit):
+            return True
+        rods = any(self.suspects.rods.values()) or self.suspects.more
+        return rods or self._suggests_fault(fit, self.stated)
+
+    def _suggests_fault(self, fit: Fit, premise: Premise) -> bool:
+        """Whether the score test of a fitted drop favours a fault beyond those of its premise."""
+        return bool((self._score_odds(fit, premise) > CLEAR).any())
+
+    def _explain(self, fit: Fit | None) -> Iterator[Explanation]:
+        """Yield faults that may explain the drop, and the hypothesis that there is none."""
         sized, discrete = self._faults
         if fit is None:
-            records = self._records(self.setting)
-            if any(possible(record) < LEAST * record.edge_count for record in records):
-                return []  # too few edges for any fall
-            stated = sum(self._read_alone(record) for record in records)
-            explanations = [*self._by_votes([*sized, *discrete], stated)]
-        else:
-            reading = weigh(fit)
-            stated, well = self._absolute(reading, self.setting.hz), well_read(reading)
-            explanations = [*self._along(fit, stated, well), *self._by_votes(discrete, stated)]
-            likelier = [cause for cause in explanations if cause.log_odds > 0.0]
-            likeliest = max(likelier, key=_log_odds, default=None)
-            explained = likeliest and likeliest.whole and likeliest.fault.shift
-            if not explained and (likelier or not well):
-                # A chain with a surplus rod looks like another drop height. A score test that
-                # starts a rod's distance away cannot see that.
-                explanations += self._by_votes(sized, stated)
-            if any(cause.whole and cause.log_odds > CLEAR for cause in explanations):
-                explanations += self._beyond(fit, stated)
-        # A fault found by score and by votes counts once.
-        best = {id(cause.fault): cause for cause in sorted(explanations, key=_log_odds)}
-        likely = [cause for cause in best.values() if cause.log_odds > 0.0]
-        return sorted(likely, key=_log_odds, reverse=True)
+            evidence = sum(map(self._read_alone, self._records(self.stated)))
+            yield Explanation(_NEITHER, {}, evidence)
+            yield from self._by_votes([*sized, *discrete])
+            return
+        stated = Explanation(_NEITHER, {}, self._evidence(weigh(fit), self.stated.hz))
+        causes = [stated, *self._along(fit), *self._by_votes(discrete)]
+        best = max(causes, key=_evidence)
+        if not (best.whole and best.fault.continuous) and (
+            best is not stated or not well_read(fit)
+        ):
+            # A chain with a surplus rod looks like another drop height. A score test that starts a
+            # rod's distance away cannot see that.
+            causes += self._by_votes(sized)
+        yield from causes
+        least = stated.evidence + CLEAR
+        is_clear = any(cause.whole and cause.evidence > least for cause in causes)
+        if is_clear and "stretch" in fit.model.unknowns:
+            # The fall may depart from the equations, without a fault.
+            scales = self.components
+            wider = replace(
+                scales, stretch=_BEYOND * scales.stretch, landed=_BEYOND * scales.landed
+            )
+            reading = weigh(settle(fit.model.copy_with(components=wider), fit.x.copy()))
+            yield Explanation(_NEITHER, {}, self._evidence(reading, self.stated.hz) - CLEAR)
 
     def _read_alone(self, record: ChainRecord) -> float:
         """Return the evidence of a side by itself, for a drop that was not identified."""
-        reading = read_quickly(self.setting.protocol, [record], self.clock_u, self.components)
+        reading = read_quickly(self.stated.protocol, [record], self.clock_u, self.components)
         if reading is None:
             return record.edge_count * math.log(MISSED)
-        return self._absolute(reading, self.setting.hz)
+        return self._evidence(reading, self.stated.hz)
 
-    def _along(self, fit: Fit, stated: float, well: bool) -> Iterator[Explanation]:
-        """Yield fits of the sized faults with the largest gain by the score test."""
-        gains, _ = self._gains(fit)
+    def _along(self, fit: Fit) -> Iterator[Explanation]:
+        """Yield fits of the continuous faults with the largest gain by the score test."""
+        gains = self._score_odds(fit, self.stated)
         # For a good reading the score test excludes faults without gain. A fault may also remove
         # the penalty for negative drag.
-        least = min(0.0, held_back(fit)) if well else -math.inf
+        least = min(0.0, held_back(fit)) if well_read(fit) else -math.inf
         for n in [int(n) for n in np.argsort(-gains) if gains[n] > least][:_TRIED]:
-            yield from self._fit_size(self._faults[0][n], 0.0, fit, stated)
+            yield from self._fit_size(self._faults[0][n], 0.0, fit)
 
-    def _beyond(self, fit: Fit, stated: float) -> Iterator[Explanation]:
-        """Yield the rival hypothesis that the fall departs from the equations, without a fault."""
-        if "stretch" not in fit.model.unknowns:
-            return
-        scales = self.components
-        wider = replace(scales, stretch=_BEYOND * scales.stretch, landed=_BEYOND * scales.landed)
-        reading = weigh(settle(fit.model.copy_with(components=wider), fit.x.copy()))
-        log_odds = self._absolute(reading, self.setting.hz) - CLEAR - stated
-        yield Explanation(NEITHER, {}, log_odds, whole=True)
+    def _score_odds(self, fit: Fit, premise: Premise) -> Array:
+        """Return the log odds of each continuous fault by its score, without its prior's cost."""
+        sized, _ = self._faults
+        test = scores(fit, [fault.direction(premise, fit.model) for fault in sized])
+        # The Occam factor: ln of the prior range of a size over its posterior width.
+        widths = math.sqrt(2.0 * math.pi) * test.u
+        spans = np.array([fault.span for fault in sized])
+        odds: Array = test.gain - np.log(np.maximum(1.0, spans / widths))
+        return odds
 
-    def _absolute(self, reading: Reading, hz: float) -> float:
+    def _evidence(self, reading: Reading, hz: float) -> float:
         """Return the evidence of a reading, comparable between premises.
 
         Two corrections apply: the density of times is converted to ticks, and the reference of
@@ -181,88 +216,74 @@ class Explainer:
         not for both edges. Otherwise a rod at an end that no gate saw by chance would count as
         absent.
         """
-        fit, ticks = reading.fit, len(self.drop.edges) * math.log(self.setting.hz / hz)
+        records, matches = reading.fit.model.records.values(), reading.fit.matches
+        ticks = len(self.drop.edges) * math.log(self.stated.hz / hz)
         missed = sum(
             train.rods.size - np.setdiff1d(train.rods, train.rods[match >= 0]).size
-            for role, record in fit.model.records.items()
-            for train, _, match in record.by_gate(fit.matches[role])
+            for record in records
+            for train, _, match in record.by_gate(matches[record.role])
         )
         return reading.evidence + ticks + missed * math.log(MISSED)
 
-    def _gains(self, fit: Fit) -> tuple[Array, float]:
-        """Return the log odds of each sized fault by its score, without the cost of its prior.
+    def _records(self, premise: Premise) -> list[ChainRecord]:
+        return chain_records(premise.protocol, premise.run, self.drop, premise.hz, premise.aside)
 
-        In addition the largest gain of any.
-        """
-        sized, _ = self._faults
-        by_fault = scores(fit, [fault.shift.direction(fit.model) for fault in sized if fault.shift])
-        # The Occam factor: ln of the prior range of a size over its posterior width.
-        ranges = [max(fault.sizes) - min(fault.sizes) for fault in sized]
-        widths = [math.sqrt(2.0 * math.pi) * score.u for score in by_fault]
-        occam = [math.log(max(1.0, a / b)) for a, b in zip(ranges, widths, strict=True)]
-        gains = np.array([score.gain for score in by_fault])
-        return gains - np.array(occam), float(gains.max(initial=0.0))
-
-    def _records(self, setting: Premise) -> list[ChainRecord]:
-        return chain_records(setting.protocol, setting.run, self.drop, setting.hz, setting.aside)
-
-    def _by_votes(self, faults: Sequence[Fault], stated: float) -> Iterator[Explanation]:
+    def _by_votes(self, faults: Sequence[Fault]) -> Iterator[Explanation]:
         """Yield fits of the faults with most votes, each at its best size; best first."""
-        least = self._net(self.setting)[1]
+        least = self._net(self.stated)[1]
         candidates = []
         for fault in faults:
             sized = [
-                (*self._net(fault.premise(self.setting, size), least), size) for size in fault.sizes
+                (*self._net(fault.change(self.stated, size), least), size) for size in fault.sizes
             ]
             share, net, size = max(sized, key=lambda row: row[1])
             if share >= RIGHT and net >= least:
                 candidates.append((net, fault, size))
         candidates.sort(key=lambda row: -row[0])
         for _, fault, size in candidates[:_TRIED]:
-            yield from self._afresh(fault, size, stated)
+            yield from self._afresh(fault, size)
 
-    def _net(self, setting: Premise, least: float = -math.inf) -> tuple[float, int]:
+    def _net(self, premise: Premise, least: float = -math.inf) -> tuple[float, int]:
         """Return the voting share of the expected edges, and votes less edges without a vote.
 
         Both are upper bounds if the second cannot reach `least`.
         """
-        records = self._records(setting)
+        records, protocol = self._records(premise), premise.protocol
+        scene = premise.hz, protocol.drop.value, protocol.gravity.value, prior_air(protocol)[0]
         expected = sum(side.edge_count for side in records)
-        most = [possible(record) for record in records]
-        votes = sum(most)
+        votes = [possible(record) for record in records]
         for n, record in enumerate(records):
-            if 2 * votes - expected < least:
+            if 2 * sum(votes) - expected < least:
                 break
-            key = expected, *_key(setting, record)
+            edges = [
+                part.tobytes() for train in record.trains for part in (train.levels, train.edge)
+            ]
+            key = record.role, *scene, *edges
             if key not in self._votes:
-                self._votes[key] = most_votes(
-                    setting.protocol, record, self.clock_u, self.components
-                )
-            votes += self._votes[key] - most[n]
-        return votes / max(1, expected), 2 * votes - expected
+                self._votes[key] = most_votes(protocol, record, self.clock_u, self.components)
+            votes[n] = self._votes[key]
+        return sum(votes) / max(1, expected), 2 * sum(votes) - expected
 
-    def _afresh(self, fault: Fault, size: float, stated: float) -> Iterator[Explanation]:
+    def _afresh(self, fault: Fault, size: float) -> Iterator[Explanation]:
         """Identify the edges anew with a fault of some size, and yield it with its evidence."""
-        premise = fault.premise(self.setting, size)
-        reading = read_quickly(
-            premise.protocol, self._records(premise), self.clock_u, self.components
-        )
+        premise = fault.change(self.stated, size)
+        records = self._records(premise)
+        reading = read_quickly(premise.protocol, records, self.clock_u, self.components)
         if reading is None:
             return
-        if fault.shift is not None:
-            yield from self._fit_size(fault, size, reading.fit, stated)
+        fit, u, occam = reading.fit, 0.0, math.log(fault.ways or len(fault.sizes))
+        if fault.continuous:
+            yield from self._fit_size(fault, size, fit)
             return
-        u, occam = 0.0, math.log(len(fault.sizes))
-        if fault.of_air:
+        if fault.code == "air":
             # κ was integrated out like all other unknowns.
-            fit, occam = reading.fit, 0.0
-            size = fit.model.kappa(fit.x)
-            u = float(fit.estimate.own_u[fit.model.unknowns["drag"]][0])
-        yield self._explanation(fault, size, u, reading, premise.hz, stated + occam)
+            size, u = (
+                fit.model.kappa(fit.x),
+                float(fit.estimate.own_u[fit.model.unknowns["drag"]][0]),
+            )
+        yield self._explanation(fault, fault.values(size, u), reading, premise, occam)
 
-    def _fit_size(
-        self, fault: Fault, size: float, fit: Fit, stated: float
-    ) -> Iterator[Explanation]:
+    def _fit_size(self, fault: Fault, size: float, fit: Fit) -> Iterator[Explanation]:
         """Fit a drop with the size of a fault as a further unknown; yield nothing if unclear.
 
         Parameters
@@ -272,56 +293,31 @@ class Explainer:
         fit
             Fit to begin with.
         """
-        assert fault.shift is not None
-        (score,) = scores(fit, [fault.shift.direction(fit.model)])
-        largest, model = max(fault.sizes), fit.model.copy_with(suspects=(fault.suspect(fit.model),))
-        first = float(np.clip(score.size, -largest, largest)) * np.append(score.follow, 1.0)
+        premise, largest = fault.change(self.stated, size), max(fault.sizes)
+        direction = fault.direction(premise, fit.model)
+        score = scores(fit, [direction])
+        model = fit.model.copy_with(suspects=(fault.suspect(fit.model, direction),))
+        first = np.clip(score.size, -largest, largest) * np.append(score.follow, 1.0)
         reading = weigh(settle(model, np.append(fit.x, 0.0) + first))
         estimate = reading.fit.estimate
         further, u = float(estimate.x[-1]), float(estimate.own_u[-1])
         if APART * u < abs(size + further) <= largest:
             # A smaller size may be zero, a larger size has another cause.
-            hz = fault.premise(self.setting, size).hz / (1.0 + model.unknowns.rate[-1] * further)
-            yield self._explanation(fault, size + further, u, reading, hz, stated)
+            premise = premise._replace(hz=premise.hz / (1.0 + model.unknowns.rate[-1] * further))
+            yield self._explanation(fault, fault.values(size + further, u), reading, premise)
 
     def _explanation(
-        self, fault: Fault, size: float, u: float, reading: Reading, hz: float, stated: float
+        self,
+        fault: Fault,
+        values: Mapping[str, Any],
+        reading: Reading,
+        premise: Premise,
+        occam: float = 0.0,
     ) -> Explanation:
-        log_odds = self._absolute(reading, hz) - CLEAR - stated
-        complete = well_read(reading) and self._gains(reading.fit)[1] < _LEFT
-        return Explanation(fault, fault.values(size, u), log_odds, complete)
+        evidence = self._evidence(reading, premise.hz) - CLEAR - occam
+        complete = well_read(reading.fit) and not self._suggests_fault(reading.fit, premise)
+        return Explanation(fault, values, evidence, complete)
 
 
-def _log_odds(cause: Explanation) -> float:
-    return cause.log_odds
-
-
-def _key(setting: Premise, record: ChainRecord) -> tuple[Hashable, ...]:
-    """Return the cache key of a side's votes."""
-    protocol = setting.protocol
-    scene = setting.hz, protocol.drop.value, protocol.gravity.value, prior_air(protocol)[0]
-    edges = [part.tobytes() for train in record.trains for part in (train.levels, train.edge)]
-    return record.role, *scene, *edges
-
-
-def name_fault(
-    causes: Sequence[Explanation], words: Vocabulary, accused: Sequence[Reason] = ()
-) -> list[Reason]:
-    """Return the reason that names the clear fault of a drop, or lists the likeliest.
-
-    Parameters
-    ----------
-    words
-        Vocabulary of the scene.
-    accused
-        Reasons to return if there is no fault.
-    """
-    if not causes or causes[0].log_odds < CLEAR or causes[0].fault is NEITHER:
-        return [*accused]
-    best, *rivals = causes
-    lead = best.log_odds - max([0.0, *(cause.log_odds for cause in rivals)])
-    if best.whole and lead > CLEAR:
-        return [make_reason(best.fault.code, words, **best.values, log_odds=lead)]
-    nameable = [cause for cause in causes if cause.fault is not NEITHER]
-    candidates = [{"code": cause.fault.code, "values": cause.values} for cause in nameable[:_NAMED]]
-    return [make_reason("unclear_fault", words, candidates=candidates)]
+def _evidence(cause: Explanation) -> float:
+    return cause.evidence

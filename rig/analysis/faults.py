@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations, repeat
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from rig.analysis.drop_model import DropModel
 from rig.analysis.unknowns import Unknown
 from rig.arrays import Array
-from rig.protocol.protocol import Gate, Gates, Protocol, RodChain, Run
+from rig.protocol.protocol import Gate, Protocol, RodChain, Run
 
 _MORE = 3  # rods by which a chain may differ
 _WIDER = 0.5  # share of the thinnest rod by which rods may differ in thickness
@@ -31,65 +31,23 @@ class Premise(NamedTuple):
     hz: float
     aside: tuple[int, ...] = ()
 
+    @property
+    def gates(self) -> tuple[Gate, ...]:
+        """The gates of the protocol."""
+        assert self.protocol.gates is not None
+        return self.protocol.gates.gates
 
-@dataclass(frozen=True)
-class Shift:
-    """Change of a protocol's values by a fault of size 1.
+    def change(self, **fields: Any) -> Premise:
+        """Return the premise with other fields of its protocol."""
+        return self._replace(protocol=replace(self.protocol, **fields))
 
-    Attributes
-    ----------
-    drop, clock, gravity
-        Change of the drop height, m, of the clock's relative rate, and of gravity, m/s².
-    gates
-        Change of each gate's height, m; empty for none.
-    chains
-        Names of the chains that are longer or thicker.
-    length, width
-        Relative change of their length, and change of their rods' width, m.
-    """
+    def with_gates(self, gates: Sequence[Gate]) -> Premise:
+        """Return the premise with other gates."""
+        assert self.protocol.gates is not None
+        return self.change(gates=replace(self.protocol.gates, gates=tuple(gates)))
 
-    drop: float = 0.0
-    clock: float = 0.0
-    gravity: float = 0.0
-    gates: tuple[float, ...] = ()
-    chains: frozenset[str] = frozenset()
-    length: float = 0.0
-    width: float = 0.0
 
-    def premise(self, stated: Premise, size: float) -> Premise:
-        """Return the stated premise changed by a fault of some size."""
-        protocol, placed = stated.protocol, _gates_of(stated.protocol)
-        drop, gravity = protocol.drop, protocol.gravity
-        gates = tuple(
-            replace(gate, height=gate.height + size * shift)
-            for gate, shift in zip(placed.gates, self.gates or repeat(0.0), strict=False)
-        )
-        changed = replace(
-            protocol,
-            drop=replace(drop, value=drop.value + size * self.drop),
-            gravity=replace(gravity, value=gravity.value + size * self.gravity),
-            gates=replace(placed, gates=gates),
-        )
-        moved = stated._replace(protocol=changed, hz=stated.hz * (1.0 - size * self.clock))
-        return _with_chains(self.chains, self._resize_chain)(moved, size)
-
-    def _resize_chain(self, chain: RodChain, size: float) -> RodChain:
-        heights = [height * (1.0 + size * self.length) for height in chain.chain.heights]
-        widths = tuple(width + size * self.width for width in chain.widths)
-        return replace(_with_rods(chain, range(len(heights)), heights), widths=widths)
-
-    def direction(self, model: DropModel) -> Array:
-        """Return the change of a drop's unknowns by a fault of size 1, shape ``(unknowns,)``."""
-        at = model.unknowns
-        moved = np.zeros(len(at))
-        for name in ("drop", "clock", "gravity"):
-            moved[at[name]] = getattr(self, name)
-        moved[at["beams"]] = self.gates or 0.0
-        for role, record in model.records.items():
-            if record.chain.name in self.chains:
-                moved[at[f"{role} rods"]] = self.length * np.array(record.chain.chain.heights)
-                moved[at[f"{role} width"]] = self.width
-        return moved
+Change = Callable[[Premise, float], Premise]
 
 
 @dataclass(frozen=True)
@@ -100,58 +58,65 @@ class Fault:
     ----------
     code
         Code of the reason that names the fault.
+    change
+        Function that returns the premise changed by a fault of some size.
     where
         Values of the reason that do not depend on the size: chain, gate or side.
-    symbol, unit, scale, offset
-        Name of the size in the reason, the suffix of its unit, and the factor and offset to
-        convert it; no symbol for a fault without a size.
+    size
+        Name of the size among the values of the reason; empty for a fault without a size.
     sizes
-        Sizes tried first, at intervals that identification tolerates.
-    shift
-        For a continuous size: the change by a fault of size 1.
-    exchange
-        For a discrete size: function that returns the changed premise.
-    of_air
-        Whether the size is κ, which is fitted if the protocol does not state drag.
+        Sizes tried first; of a continuous size at intervals that identification tolerates.
+    ways
+        Number of sizes that are equally likely beforehand, if it is not that of `sizes`.
+    continuous
+        Whether the size is fitted. The premise then changes in proportion to it.
     """
 
     code: str
+    change: Change
     where: Mapping[str, Any] = field(default_factory=dict)
-    symbol: str = ""
-    unit: str = ""
-    scale: float = 1
-    offset: float = 0
+    size: str = ""
     sizes: tuple[float, ...] = (0.0,)
-    shift: Shift | None = None
-    exchange: Callable[[Premise, float], Premise] = lambda stated, _size: stated
-    of_air: bool = False
+    ways: int = 0
+    continuous: bool = False
 
     def values(self, size: float, u: float) -> dict[str, Any]:
         """Return the values of the reason that names the fault; `u` is 0 for a count."""
-        values = dict(self.where)
-        if self.symbol:
-            values[f"{self.symbol}{self.unit}"] = self.offset + self.scale * size
-        if u:
-            values[f"U95{self.unit}"] = 2.0 * self.scale * u
-        return values
+        sizes = {self.size: size} if self.size else {}
+        sizes |= {"U95_m" if self.size == "size_m" else "U95": 2.0 * u} if u else {}
+        return {**self.where, **sizes}
 
-    def premise(self, stated: Premise, size: float) -> Premise:
-        """Return the stated premise changed by a fault of some size."""
-        return (self.shift.premise if self.shift else self.exchange)(stated, size)
+    @property
+    def span(self) -> float:
+        """Range of a continuous size."""
+        return max(self.sizes) - min(self.sizes)
 
-    def suspect(self, model: DropModel) -> Unknown:
+    def direction(self, stated: Premise, model: DropModel) -> Array:
+        """Return the change of a drop's unknowns by a fault of size 1, shape ``(unknowns,)``."""
+        at, changed = model.unknowns, self.change(stated, 1.0)
+        before, after = stated.protocol, changed.protocol
+        moved = np.zeros(len(at))
+        moved[at["drop"]] = after.drop.value - before.drop.value
+        moved[at["gravity"]] = after.gravity.value - before.gravity.value
+        moved[at["clock"]] = 1.0 - changed.hz / stated.hz
+        pairs = zip(changed.gates, stated.gates, strict=True)
+        moved[at["beams"]] = [gate.height - other.height for gate, other in pairs]
+        for role, record in model.records.items():
+            chain, other = (part.chains[record.chain.name] for part in (after, before))
+            moved[at[f"{role} rods"]] = np.subtract(chain.chain.heights, other.chain.heights)
+            moved[at[f"{role} width"]] = chain.widths[0] - other.widths[0]
+        return moved
+
+    def suspect(self, model: DropModel, direction: Array) -> Unknown:
         """Return the size as a further unknown, with a normal prior for the range of sizes.
 
         The prior's density at its mean is that of a uniform distribution over the range, whose
         width is √(2π) standard deviations.
         """
-        assert self.shift is not None
-        direction = self.shift.direction(model)
-        span = max(self.sizes) - min(self.sizes)
         return Unknown(
             "fault",
             "edges",
-            lambda _side: span / math.sqrt(2.0 * math.pi),
+            lambda _side: self.span / math.sqrt(2.0 * math.pi),
             moves="all",
             path=lambda side: (model.slopes[side.record.role].path @ direction)[:, None],
             level=lambda side: model.slopes[side.record.role].levels @ direction,
@@ -159,118 +124,138 @@ class Fault:
         )
 
 
-def faults(protocol: Protocol, run: Run, suspect: Sequence[int]) -> list[Fault]:
-    """Return all distinguishable faults of a scene.
+class Suspects(NamedTuple):
+    """What a drop's edges cast doubt on.
 
-    Parameters
+    Attributes
     ----------
-    suspect
+    gates
         Numbers of the gates of which any two may be exchanged.
+    rods
+        Numbers of the rods that no gate saw, by chain; the lowest is 0.
+    more
+        Whether all gates of a chain have edges after its last rod, or two gates have as many edges
+        as the other should.
     """
-    gates = _gates_of(protocol).gates
-    exchanges = [_exchange(gates, a, b) for a, b in combinations(suspect, 2)]
-    chains, rig = _chain_faults(protocol, run), _rig_faults(protocol)
-    return [*chains, *rig, *_gate_faults(gates), *exchanges]
+
+    gates: Sequence[int] = ()
+    rods: Mapping[str, Sequence[int]] = {}
+    more: bool = False
 
 
-def _sized_fault(
-    code: str, shift: Shift, limit: float, step: float, *names: str, scale: float = 1, **where: Any
+def faults(stated: Premise, suspects: Suspects) -> Iterator[Fault]:
+    """Yield all distinguishable faults of a scene."""
+    run, protocol = stated.run, stated.protocol
+    sides = {"impact": run.impact, "free": run.free}
+    hung = {side: protocol.chains[name] for side, name in sides.items() if name}
+    for side, chain in hung.items():
+        yield from _size_faults([chain], chain.name)
+        yield from _order_faults(chain, side, suspects.rods.get(chain.name, ()))
+    if len(hung) > 1:
+        yield from _size_faults([*hung.values()])
+        if protocol.unlike_chains:
+            crossed = replace(run, impact=run.free, free=run.impact)
+            yield Fault("chains_exchanged", lambda stated, _: stated._replace(run=crossed), sides)
+    yield from _rig_faults(stated)
+    yield from _gate_faults(stated.gates)
+    for pair in combinations(suspects.gates, 2):
+        yield _exchange(stated.gates, *pair)
+
+
+def _continuous(
+    code: str, change: Change, limit: float, step: float, size: str = "size_m", **where: Any
 ) -> Fault:
     """Return a fault of any size up to ±`limit`, tried in steps; by default a length."""
     count = math.ceil(limit / step)
     sizes = tuple(step * n for n in range(-count, count + 1) if n)
-    symbol, unit = names or ("size", "_m")
-    return Fault(code, where, symbol, unit, scale, sizes=sizes, shift=shift)
+    return Fault(code, change, where, size, sizes, continuous=True)
 
 
-def _chain_faults(protocol: Protocol, run: Run) -> Iterator[Fault]:
-    """Yield the faults of each chain, of both chains together, and of their places."""
-    names = {role: name for role, name in (("impact", run.impact), ("free", run.free)) if name}
-    groups = [(frozenset({name}), name) for name in names.values()]
-    if len(names) > 1:
-        groups.append((frozenset(names.values()), ""))
-    for group, name in groups:
-        chain = protocol.chains[min(group)]
-        top, rods = chain.chain.heights[-1], chain.chain.rods
-        if rods > 1:  # a single object has neither length nor missing rods
-            longer = Shift(chains=group, length=1.0)
-            yield _sized_fault("chain_length", longer, 0.06, 0.015, scale=top, name=name)
-            yield Fault(
-                "rod_count",
-                {"name": name, "stated": rods},
-                "rods",
-                offset=rods,
-                sizes=tuple(n for n in range(-_MORE, _MORE + 1) if n and rods + n >= 2),
-                exchange=_with_chains(group, _with_more),
-            )
-        limit = _WIDER * min(chain.widths)
-        yield _sized_fault("thickness", Shift(chains=group, width=1.0), limit, limit, name=name)
-    for role, name in names.items():
-        if upside_down(protocol.chains[name]) is not None:
-            turned = _with_chains({name}, lambda chain, _: upside_down(chain) or chain)
-            yield Fault("upside_down", {"name": name, "side": role}, exchange=turned)
-    if len(names) > 1 and protocol.unlike_chains:
-        yield Fault(
-            "chains_exchanged",
-            {"impact": run.impact, "free": run.free},
-            exchange=lambda stated, _: stated._replace(
-                run=replace(stated.run, impact=stated.run.free, free=stated.run.impact)
-            ),
-        )
+def _size_faults(chains: Sequence[RodChain], name: str = "") -> Iterator[Fault]:
+    """Yield the faults of the size of one chain, or of both chains together without a name."""
+    first, names = chains[0].chain, [chain.name for chain in chains]
+    if first.rods > 1:  # a single object has neither length nor missing rods
+        limit, step = 0.06 * first.length, 0.015 * first.length
+        stretched = _of_rods(names, lambda rods, size: _stretch(rods, 1.0 + size / first.length))
+        yield _continuous("chain_length", stretched, limit, step, name=name)
+        counts = {*range(max(2, first.rods - _MORE), first.rods + _MORE + 1)} - {first.rods}
+        more = _of_rods(names, lambda rods, count: _add(rods, round(count) - first.rods))
+        where = {"name": name, "stated": first.rods}
+        yield Fault("rod_count", more, where, "rods", tuple(sorted(counts)))
+    limit = _WIDER * min(chains[0].widths)
+    yield _continuous("thickness", _of_rods(names, _thicken), limit, limit, name=name)
 
 
-def _rig_faults(protocol: Protocol) -> Iterator[Fault]:
+def _order_faults(chain: RodChain, side: str, absent: Sequence[int]) -> Iterator[Fault]:
+    """Yield the faults of a chain's order on a side: upside down, or with a gap."""
+    where, count, rods = {"name": chain.name, "side": side}, chain.chain.rods, rods_of(chain)
+    if not all(alike(*pair) for pair in zip(rods, turn(rods), strict=True)):
+        yield Fault("upside_down", _of_rods([chain.name], lambda rods, _: turn(rods)), where)
+    # Without a rod at an end, it has fewer rods or another drop height.
+    if numbers := tuple(rod + 1 for rod in absent if 0 < rod < count - 1):
+        gap = _of_rods([chain.name], lambda rods, n: [*rods[: round(n) - 1], *rods[round(n) :]])
+        yield Fault("rod_missing", gap, where | {"rods": count}, "rod", numbers, ways=count)
+
+
+def _rig_faults(stated: Premise) -> Iterator[Fault]:
     """Yield the faults of everything that both chains share."""
-    yield _sized_fault("drop_height", Shift(drop=1.0), 60e-3, 10e-3)
-    yield _sized_fault("clock", Shift(clock=1.0), 0.05, 0.01, "share", "")
-    if protocol.drag is not None:
-        yield Fault(
-            "air",
-            symbol="kappa",
-            exchange=lambda stated, _: stated._replace(
-                protocol=replace(stated.protocol, drag=None)
-            ),
-            of_air=True,
-        )
-    if protocol.surface is not None:
+    yield _continuous("drop_height", _hang_higher, 60e-3, 10e-3)
+    yield _continuous("clock", _slow_clock, 0.05, 0.01, "share")
+    if stated.protocol.drag is not None:
+        yield Fault("air", lambda premise, _: premise.change(drag=None), size="kappa")
+    if stated.protocol.surface is not None:
         # Without a surface there is no contact point, and gravity is the measurand.
-        gates = _gates_of(protocol).gates
-        yield _height_fault("all_gates", gates, gates)
-        gravity = Shift(gravity=protocol.gravity.value)
-        yield _sized_fault("gravity", gravity, 0.10, 0.02, "share", "")
+        yield _raised("all_gates", range(len(stated.gates)))
+        yield _continuous("gravity", _add_gravity, 0.10, 0.02, "share")
 
 
 def _gate_faults(gates: Sequence[Gate]) -> Iterator[Fault]:
     """Yield the faults of each post with several gates, and of each gate."""
     sides = [gate.side for gate in gates]
     for side in dict.fromkeys(sides):
-        if 1 < sides.count(side) < len(sides):
-            post = [gate for gate in gates if gate.side == side]
-            yield _height_fault("post", gates, post, side=side)
-    for gate in gates if len(gates) > 1 else ():
-        yield _height_fault("gate_height", gates, [gate], **gate_values(gate))
+        post = [n for n, gate in enumerate(gates) if gate.side == side]
+        if 1 < len(post) < len(gates):
+            yield _raised("post", post, side=side)
+    for n, gate in enumerate(gates) if len(gates) > 1 else ():
+        yield _raised("gate_height", [n], **gate_values(gate))
 
 
-def _height_fault(code: str, gates: Sequence[Gate], wrong: Collection[Gate], **where: Any) -> Fault:
-    shift = Shift(gates=tuple(float(gate in wrong) for gate in gates))
-    return _sized_fault(code, shift, 40e-3, 10e-3, **where)
+def _hang_higher(premise: Premise, size: float) -> Premise:
+    drop = premise.protocol.drop
+    return premise.change(drop=replace(drop, value=drop.value + size))
 
 
-def _gates_of(protocol: Protocol) -> Gates:
-    assert protocol.gates is not None
-    return protocol.gates
+def _slow_clock(premise: Premise, share: float) -> Premise:
+    return premise._replace(hz=premise.hz * (1.0 - share))
+
+
+def _add_gravity(premise: Premise, share: float) -> Premise:
+    gravity = premise.protocol.gravity
+    return premise.change(gravity=replace(gravity, value=gravity.value * (1.0 + share)))
+
+
+def _raised(code: str, numbers: Collection[int], **where: Any) -> Fault:
+    """Return the fault of some gates, by number, that are higher or lower."""
+
+    def change(premise: Premise, size: float) -> Premise:
+        gates = [*premise.gates]
+        for n in numbers:
+            gates[n] = replace(gates[n], height=gates[n].height + size)
+        return premise.with_gates(gates)
+
+    return _continuous(code, change, 40e-3, 10e-3, **where)
 
 
 def _exchange(gates: Sequence[Gate], a: int, b: int) -> Fault:
-    def exchange(stated: Premise, _: float) -> Premise:
-        protocol, changed = stated.protocol, [*gates]
-        changed[a] = replace(gates[a], channel=gates[b].channel)
-        changed[b] = replace(gates[b], channel=gates[a].channel)
-        placed = replace(_gates_of(protocol), gates=tuple(changed))
-        return stated._replace(protocol=replace(protocol, gates=placed))
+    """Return the fault of two gates, by number, on each other's channel."""
 
-    both = [gate_values(gates[a]), gate_values(gates[b])]
-    return Fault("gates_exchanged", {"at": both}, exchange=exchange)
+    def change(premise: Premise, _: float) -> Premise:
+        exchanged = [*premise.gates]
+        exchanged[a] = replace(gates[a], channel=gates[b].channel)
+        exchanged[b] = replace(gates[b], channel=gates[a].channel)
+        return premise.with_gates(exchanged)
+
+    return Fault("gates_exchanged", change, {"at": [gate_values(gates[n]) for n in (a, b)]})
 
 
 def gate_values(gate: Gate) -> dict[str, Any]:
@@ -279,43 +264,56 @@ def gate_values(gate: Gate) -> dict[str, Any]:
     return {"channel": gate.channel, "side": gate.side, "height_m": height}
 
 
-def _with_chains(
-    names: Collection[str], replacement: Callable[[RodChain, float], RodChain]
-) -> Callable[[Premise, float], Premise]:
-    def change(setting: Premise, size: float) -> Premise:
-        chains = {
-            name: replacement(chain, size) if name in names else chain
-            for name, chain in setting.protocol.chains.items()
-        }
-        return setting._replace(protocol=replace(setting.protocol, chains=chains))
+class Rod(NamedTuple):
+    """A rod of a chain, as in `RodChain`; its height is above the lowest rod, m."""
 
-    return change
+    mass: float
+    height: float
+    width: float
+    diameter: float
 
 
-def _with_rods(chain: RodChain, order: Sequence[int], heights: Sequence[float]) -> RodChain:
-    """Return a chain of the rods numbered `order`, at other heights above the lowest, m."""
-
-    def chosen(values: tuple[float, ...]) -> tuple[float, ...]:
-        return tuple(values[n] for n in order)
-
-    hung = replace(chain.chain, masses=chosen(chain.chain.masses), heights=tuple(heights))
-    widths, diameters = chosen(chain.widths), chosen(chain.diameters)
-    return replace(chain, chain=hung, widths=widths, diameters=diameters)
+def rods_of(chain: RodChain) -> list[Rod]:
+    """Return the rods of a chain, bottom up."""
+    rods = zip(chain.chain.masses, chain.chain.heights, chain.widths, chain.diameters, strict=True)
+    return [Rod(*values) for values in rods]
 
 
-def _with_more(chain: RodChain, count_more: float) -> RodChain:
+def _of_rods(names: Collection[str], change: Callable[[list[Rod], float], list[Rod]]) -> Change:
+    """Return the change of a premise by a change of the rods of some chains."""
+
+    def changed(premise: Premise, size: float) -> Premise:
+        chains = dict(premise.protocol.chains)
+        for name in names:
+            rods = change(rods_of(chains[name]), size)
+            masses, heights, widths, diameters = zip(*rods, strict=True)
+            hung = replace(chains[name].chain, masses=masses, heights=heights)
+            chains[name] = replace(chains[name], chain=hung, widths=widths, diameters=diameters)
+        return premise.change(chains=chains)
+
+    return changed
+
+
+def _stretch(rods: list[Rod], by: float) -> list[Rod]:
+    return [rod._replace(height=rod.height * by) for rod in rods]
+
+
+def _thicken(rods: list[Rod], size: float) -> list[Rod]:
+    return [rod._replace(width=rod.width + size) for rod in rods]
+
+
+def _add(rods: list[Rod], more: int) -> list[Rod]:
     """Return a chain with rods like the top rod added at the top, or with rods removed."""
-    heights, count = chain.chain.heights, chain.chain.rods + round(count_more)
-    top, pitch = len(heights) - 1, heights[-1] - heights[-2] if len(heights) > 1 else 0.0
-    order = [min(n, top) for n in range(count)]
-    return _with_rods(chain, order, [heights[k] + pitch * (n - k) for n, k in enumerate(order)])
+    top, pitch = rods[-1], rods[-1].height - rods[max(0, len(rods) - 2)].height
+    added = [top._replace(height=top.height + pitch * n) for n in range(1, more + 1)]
+    return [*rods[: len(rods) + more], *added]
 
 
-def upside_down(chain: RodChain) -> RodChain | None:
-    """Return a chain upside down; `None` if that makes no difference."""
-    heights = chain.chain.heights
-    turned = [heights[-1] - height for height in heights[::-1]]
-    alike = all(abs(a - b) < 1e-3 for a, b in zip(turned, heights, strict=True))
-    if alike and chain.widths[::-1] == chain.widths:
-        return None
-    return _with_rods(chain, range(len(heights))[::-1], turned)
+def turn(rods: list[Rod]) -> list[Rod]:
+    """Return a chain upside down."""
+    return [rod._replace(height=rods[-1].height - rod.height) for rod in rods[::-1]]
+
+
+def alike(rod: Rod, other: Rod) -> bool:
+    """Whether two rods at the same place of two chains cannot be told apart."""
+    return abs(rod.height - other.height) < 1e-3 and rod.width == other.width

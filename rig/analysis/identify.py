@@ -111,8 +111,6 @@ class DropIdentity:
         Rounded time scale.
     unlike
         Reasons why the edges do not match a fall of each chain, by role; empty if they do.
-    poor
-        Roles of chains with too few matched edges.
     begun
         The fitted fall; `None` if the drop was not identified.
     explained
@@ -121,7 +119,6 @@ class DropIdentity:
 
     scale: TimeScale
     unlike: Mapping[str, Reason]
-    poor: tuple[str, ...] = ()
     begun: Begun | None = None
     explained: tuple[Reason, ...] | None = None
 
@@ -196,9 +193,8 @@ def most_votes(
     return min(votes, possible(record))  # many edges of a flicker vote for the same rod
 
 
-def well_read(reading: Reading) -> bool:
+def well_read(fit: Fit) -> bool:
     """Whether nearly all matchable edges are matched, with usual scatter and unknowns in range."""
-    fit = reading.fit
     matchable = sum(possible(record) for record in fit.model.records.values())
     expected = sum(record.edge_count for record in fit.model.records.values())
     many = fit.match_count >= max(LEAST * max(1, expected), _FAIR * matchable)

@@ -8,6 +8,7 @@ valid.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from contextlib import suppress
 
 from rig.analysis.fit import Fit
@@ -23,25 +24,21 @@ _MODEL = 0.15
 """Relative standard uncertainty of the model's α: resolved rods give up to 40 % more."""
 
 
-def other_incline(fit: Fit, run: Run) -> tuple[Reason, ...]:
-    """Return the reason that names a clearly likelier incline; empty if there is none."""
-    model, estimate, incline = fit.model, fit.estimate, run.incline_deg
-    surface = model.protocol.surface
-    if surface is None or incline is None or "alpha" not in model.unknowns:
-        return ()
-    alpha = float(model.alphas(estimate.x)[0])
-    u = float(estimate.own_u[model.unknowns["alpha"]][0])
+def other_incline(fit: Fit, run: Run) -> Iterator[Reason]:
+    """Yield the reason that names a clearly likelier incline, if there is one."""
+    model, stated, surface = fit.model, run.incline_deg, fit.model.protocol.surface
+    if surface is None or stated is None or "alpha" not in model.unknowns:
+        return
+    alpha = float(model.alphas(fit.x)[0])
+    u = float(fit.estimate.own_u[model.unknowns["alpha"]][0])
     likely: dict[float, tuple[float, float]] = {}  # ln p of α, and its deviation in units of sd
-    for angle in (incline, *model.protocol.plan.inclines):
+    for angle in (stated, *model.protocol.plan.inclines):
         with suppress(DomainError):
             expected = expected_alpha(model.records["impact"].chain.chain, surface, angle)
             sd = math.hypot(u, expected.u, _MODEL * expected.value)
             far = abs(alpha - expected.value) / sd
             likely[angle] = -0.5 * far**2 - math.log(sd), far
-    if incline not in likely:
-        return ()
-    best = max(likely, key=lambda angle: likely[angle][0])
-    if likely[best][1] > _FITS or likely[best][0] - likely[incline][0] < CLEAR:
-        return ()
-    angles = {"likelier_deg": best, "stated_deg": incline}
-    return (make_reason("other_incline", alpha=alpha, U95=2.0 * u, **angles),)
+    best = max(likely, key=lambda angle: likely[angle], default=stated)
+    if stated in likely and likely[best][1] < _FITS and likely[best][0] > likely[stated][0] + CLEAR:
+        values = {"alpha": alpha, "U95": 2.0 * u, "likelier_deg": best, "stated_deg": stated}
+        yield make_reason("other_incline", model.protocol.vocabulary, **values)

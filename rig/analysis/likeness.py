@@ -43,12 +43,12 @@ class Likeness(NamedTuple):
     def sentence(self) -> str:
         """The comparison in words."""
         size = f"{max(self.departure * 1e3, _LEAST_MM):.2f} mm"
-        vary = f"{100 * (self.impulses or 0.0):.0f} %"
-        impacts = "" if self.impulses is None else f"; single impacts vary by {vary}"
+        impulses = self.impulses
+        vary = "" if impulses is None else f"; single impacts vary by {100.0 * impulses:.0f} %"
         if self.like:
-            return f"Measured positions match the model to {size}{impacts}."
+            return f"Measured positions match the model to {size}{vary}."
         return (
-            f"Measured positions differ from the model by {size} (one standard deviation){impacts}."
+            f"Measured positions differ from the model by {size} (one standard deviation){vary}."
             " Results and their ± allow for this; β, μ and γ do not."
         )
 

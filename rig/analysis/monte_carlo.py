@@ -68,16 +68,11 @@ def monte_carlo(fit: Fit, trials: int, seed: int) -> dict[str, TrialStats]:
     sd = np.where(unknowns.flat, 0.0, unknowns.sd)  # unknowns without a prior are not drawn
     values: dict[str, list[float]] = {}  # a shifted top rod may never strike
     for _ in range(trials):
-        shaken, centre = _shake(fit, rng), sd * rng.normal(size=sd.size)
-        fitted = adjust(shaken, fit.matches, at, centre).x
+        shaken = _shake(fit, rng)
+        fitted = adjust(shaken, fit.matches, at, centre=sd * rng.normal(size=sd.size)).x
         for name, dual in measurands(shaken, fitted).items():
             values.setdefault(name, []).append(dual.value)
     return {name: TrialStats.of(np.array(drawn)) for name, drawn in values.items()}
-
-
-def tolerance(u: float, digits: int = 1) -> float:
-    """Return δ, half a unit of the last significant digit of u (JCGM 101, 7.9.2)."""
-    return 0.5 * 10.0 ** (math.floor(math.log10(u)) + 1 - digits)
 
 
 def agreement(
@@ -98,11 +93,12 @@ def agreement(
         trials; ``agrees``, whether both ends are within the tolerance, and ``decided``, whether
         there are enough trials to decide that.
     """
-    half = coverage_factor(math.inf, PROBABILITY) * u
+    half, error = coverage_factor(math.inf, PROBABILITY) * u, 2.0 * _END * u / math.sqrt(trials)
     low, high = abs(value - half - drawn.low), abs(value + half - drawn.high)
-    most, error, off = tolerance(u, digits), 2.0 * _END * u / math.sqrt(trials), max(low, high)
-    sizes = {"d_low": low, "d_high": high, "tolerance": most, "error": error}
-    return sizes | {"agrees": off <= most, "decided": abs(off - most) > error}
+    # Half a unit of the last significant digit of u (JCGM 101, 7.9.2).
+    tolerance, off = 0.5 * 10.0 ** (math.floor(math.log10(u)) + 1 - digits), max(low, high)
+    sizes = {"d_low": low, "d_high": high, "tolerance": tolerance, "error": error}
+    return sizes | {"agrees": off <= tolerance, "decided": abs(off - tolerance) > error}
 
 
 def _shake(fit: Fit, rng: Generator) -> DropModel:

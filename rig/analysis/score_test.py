@@ -17,28 +17,27 @@ from rig.arrays import Array
 _UNTOLD = 1e-12  # share of a direction's information below which other unknowns replace it
 
 
-class Score(NamedTuple):
-    """Score test of a shift along a direction.
+class Scores(NamedTuple):
+    """Score tests of shifts along directions.
 
     Attributes
     ----------
-    size
-        Best shift, in units of the direction.
-    u
-        Its standard uncertainty; infinite if the edges do not determine it.
+    size, u
+        Best shift, in units of each direction, and its standard uncertainty, infinite if the edges
+        do not determine it; shape ``(directions,)``.
     gain
-        Gain of the log likelihood.
+        Gain of the log likelihood, shape ``(directions,)``.
     follow
-        Change of the other unknowns for a shift of size 1; shape ``(unknowns,)``.
+        Change of the other unknowns for a shift of size 1; shape ``(unknowns, directions)``.
     """
 
-    size: float
-    u: float
-    gain: float
+    size: Array
+    u: Array
+    gain: Array
     follow: Array
 
 
-def scores(fit: Fit, directions: Sequence[Array]) -> list[Score]:
+def scores(fit: Fit, directions: Sequence[Array]) -> Scores:
     """Return the score test of each direction, as a shift without a prior.
 
     With J the derivatives of the observations at the estimate, r the residuals, both in standard
@@ -50,27 +49,18 @@ def scores(fit: Fit, directions: Sequence[Array]) -> list[Score]:
     directions
         Directions of the unknowns, shape ``(unknowns,)`` each.
     """
-    if not directions:
-        return []
-    estimate = fit.estimate
-    along = np.stack(directions, axis=1)
-    slope, full = np.zeros(along.shape[1]), np.zeros(along.shape[1])
-    shared = np.zeros(along.shape)
-    seen = [(rows, rows.slopes @ along[rows.columns]) for rows in estimate.rows.values()]
-    for rows, moved in seen:
-        slope += rows.left @ moved
-        full += np.sum(moved**2, axis=0)
-        shared[rows.columns] += estimate.sd[rows.columns, None] * (rows.slopes.T @ moved)
-    follow = estimate.inverse @ (estimate.inverse.T @ shared)
+    estimate, along = fit.estimate, np.reshape(directions, (-1, fit.x.size)).T
+    rows = estimate.rows.values()
+    jacobian = np.zeros((sum(side.left.size for side in rows), fit.x.size))
+    begin = 0
+    for side in rows:
+        begin, first = begin + side.left.size, begin
+        jacobian[first:begin, side.columns] = side.slopes
+    left, moved = np.concatenate([side.left for side in rows]), jacobian @ along
+    jacobian *= estimate.sd
+    follow = -estimate.inverse @ (estimate.inverse.T @ (jacobian.T @ moved))
     # Information left by the other unknowns and priors, without a difference of large numbers.
-    own = np.sum(follow**2, axis=0)
-    for rows, moved in seen:
-        rest = moved - rows.slopes @ (estimate.sd[:, None] * follow)[rows.columns]
-        own += np.sum(rest**2, axis=0)
-    sure = own > _UNTOLD * full
-    h = np.where(sure, own, np.inf)
-    u = np.where(sure, h**-0.5, np.inf)
-    moves = -estimate.sd[:, None] * follow
-    sizes, gains = -slope / h, 0.5 * slope**2 / h
-    table = zip(sizes.tolist(), u.tolist(), gains.tolist(), moves.T, strict=True)
-    return [Score(*one) for one in table]
+    own = np.sum((moved + jacobian @ follow) ** 2, axis=0) + np.sum(follow**2, axis=0)
+    h = np.where(own > _UNTOLD * np.sum(moved**2, axis=0), own, np.inf)
+    slope, u = left @ moved, np.where(np.isfinite(h), h**-0.5, np.inf)
+    return Scores(-slope / h, u, 0.5 * slope**2 / h, estimate.sd[:, None] * follow)

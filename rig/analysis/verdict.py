@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
-from rig.analysis.adjust import Estimate
 from rig.analysis.annealing import MISSED
 from rig.analysis.chain_records import SIDES
-from rig.analysis.diagnoses import Diagnosis, diagnose
+from rig.analysis.diagnoses import gate_reasons
 from rig.analysis.distributions import most_by_chance
 from rig.analysis.edge_classes import UnmatchedEdge
 from rig.analysis.equations import STRAY
@@ -32,10 +31,9 @@ _SURE = 4.0  # standard uncertainties
 
 def verdict_of(reasons: Iterable[Reason]) -> Verdict:
     """Return the verdict by the most severe reason."""
-    severities = {reason.severity for reason in reasons}
-    if Severity.VOID in severities:
-        return "void"
-    return "marginal" if Severity.DOUBT in severities else "accepted"
+    severity = max((reason.severity for reason in reasons), default=Severity.REMARK)
+    verdicts: dict[Severity, Verdict] = {Severity.VOID: "void", Severity.DOUBT: "marginal"}
+    return verdicts.get(severity, "accepted")
 
 
 def judge_record(drop: Drop, audit: Audit) -> tuple[Reason, ...]:
@@ -47,16 +45,15 @@ def judge_record(drop: Drop, audit: Audit) -> tuple[Reason, ...]:
 
 
 def judge(
-    protocol: Protocol,
+    fit: Fit,
     run: Run,
     drop: Drop,
     audit: Audit,
     values: Mapping[str, Measured],
-    fit: Fit,
     by_passages: Mapping[str, Measured],
     unmatched: Collection[UnmatchedEdge],
-) -> Diagnosis:
-    """Return all reasons about a fitted drop, and the gates under suspicion.
+) -> tuple[Reason, ...]:
+    """Return all reasons about a fitted drop, the most severe first.
 
     Parameters
     ----------
@@ -65,34 +62,17 @@ def judge(
     unmatched
         Edges that are missing or belong to no rod.
     """
-    record, diagnosis = judge_record(drop, audit), diagnose(fit)
-    void, doubts = _by_severity(diagnosis.reasons)
-    if diagnosis.known:  # the known fault causes all other oddities
-        return Diagnosis((*record, *void), known=True)
-    air, remarks, estimate = _air(fit), other_incline(fit, run), fit.estimate
+    protocol = fit.model.protocol
+    reasons = [*judge_record(drop, audit), *_counts(protocol, audit)]
+    reasons += [*release_reasons(protocol, values), *_air(fit)]
     # With wrong drag, the fit says nothing about the gates.
-    accused = air["air"] or tuple(void)
-    beyond, near = _by_severity([*_counts(protocol, audit), *release_reasons(protocol, values)])
-    pushed = air["air_accelerates"]
-    odd = diagnosis.odd or bool(pushed) or any(why.code == "edges_missed" for why in beyond)
-    odd |= estimate.scatter > RESTLESS or not estimate.settled
-    void = [*record, *beyond, *accused, *air["air_implausible"]]
-    reasons = [*void, *doubts]  # doubts about gates may be the cause
-    if not void:
-        reasons += [*near, *_doubts(protocol, drop, estimate), *pushed]
+    is_air = any(reason.code == "air" for reason in reasons)
+    reasons += [why for why in gate_reasons(fit) if not is_air or why.severity < Severity.VOID]
+    if verdict_of(reasons) != "void":  # else all this may be the consequence
+        reasons += [*_doubts(fit, drop, unmatched), *disagreements(values, by_passages)]
         # A drop whose α differs from the model's is still good: that is a result.
-        reasons += [*disagreements(values, by_passages), *remarks]
-        later = sum(edge.kind == "later passage" for edge in unmatched)
-        reasons += [make_reason("later_passages", protocol.vocabulary, edges=later)] * (later > 0)
-    return Diagnosis(tuple(reasons), diagnosis.suspects, odd, accused=(*accused, *pushed, *remarks))
-
-
-def _by_severity(reasons: Iterable[Reason]) -> tuple[list[Reason], list[Reason]]:
-    """Split reasons into those that make a drop void and all others."""
-    parts: tuple[list[Reason], list[Reason]] = [], []
-    for reason in reasons:
-        parts[reason.severity is not Severity.VOID].append(reason)
-    return parts
+        reasons += other_incline(fit, run)
+    return tuple(sorted(reasons, key=lambda reason: -reason.severity))
 
 
 def _counts(protocol: Protocol, audit: Audit) -> Iterator[Reason]:
@@ -101,16 +81,16 @@ def _counts(protocol: Protocol, audit: Audit) -> Iterator[Reason]:
     With few edges, a single edge is a large share. So a rig with the usual rate of misses must not
     lose more than 1 drop in 1000 by chance, and a single stray pulse is tolerated.
     """
-    accept = protocol.accept
-    chance = most_by_chance(audit.edge_count, min(MISSED, accept.missed_edges / 2.0))
-    if audit.missed > accept.missed_edges * audit.edge_count:
-        why = "edges_missed" if audit.missed > chance else "edges_missed_few"
-        counts = {"missed": audit.missed, "expected": audit.edge_count}
-        yield make_reason(why, protocol.vocabulary, **counts, limit=accept.missed_edges)
-    if audit.unexplained > accept.unexplained_edges * audit.received:
-        why = "edges_unexplained" if audit.unexplained > SIDES else "edges_unexplained_few"
-        counts = {"unexplained": audit.unexplained, "received": audit.received}
-        yield make_reason(why, protocol.vocabulary, **counts, limit=accept.unexplained_edges)
+    accept, words = protocol.accept, protocol.vocabulary
+    missed, expected, limit = audit.missed, audit.edge_count, accept.missed_edges
+    if missed > limit * expected:
+        chance = most_by_chance(expected, min(MISSED, limit / 2.0))
+        code = "edges_missed" if missed > chance else "edges_missed_few"
+        yield make_reason(code, words, missed=missed, expected=expected, limit=limit)
+    surplus, received, limit = audit.unexplained, audit.received, accept.unexplained_edges
+    if surplus > limit * received:
+        code = "edges_unexplained" if surplus > SIDES else "edges_unexplained_few"
+        yield make_reason(code, words, unexplained=surplus, received=received, limit=limit)
 
 
 def release_reasons(protocol: Protocol, values: Mapping[str, Measured]) -> tuple[Reason, ...]:
@@ -131,52 +111,49 @@ def release_reasons(protocol: Protocol, values: Mapping[str, Measured]) -> tuple
 
 def nearly_in_time(result: DropResult, limit: float) -> bool:
     """Whether a drop is void only for its release skew, by less than its uncertainty."""
-    if result.verdict != "void":
-        return False
-    if {why.code for why in _by_severity(result.reasons)[0]} != {"release_skew"}:
+    if result.verdict != "void" or is_wrong(result.reasons):
         return False
     skew = result.quantities[RELEASE_SKEW.name]
     return abs(skew.value) - skew.expanded < limit
 
 
-def _doubts(protocol: Protocol, drop: Drop, estimate: Estimate) -> Iterator[Reason]:
-    """Yield remarks about a fit and the device's certificate."""
+def is_wrong(reasons: Iterable[Reason]) -> bool:
+    """Whether a drop is void for more than its release skew, which other gates would not mend."""
+    void = {reason.code for reason in reasons if reason.severity is Severity.VOID}
+    return bool(void - {"release_skew"})
+
+
+def _doubts(fit: Fit, drop: Drop, unmatched: Collection[UnmatchedEdge]) -> Iterator[Reason]:
+    """Yield remarks about a fit, the device's certificate, and edges after the passage."""
+    estimate, words = fit.estimate, fit.model.protocol.vocabulary
     if estimate.scatter > RESTLESS:
         yield make_reason("scatter", factor=estimate.scatter)
     if not estimate.settled:
-        yield make_reason("not_converged", protocol.vocabulary)
+        yield make_reason("not_converged", words)
     device, edges = drop.certificate, max(1, len(drop.edges))
-    if device is not None and device.late > LATE * edges:
+    if device and device.late > LATE * edges:
         yield make_reason("late_stamps", edges=device.late)
     # A pulse too short to be timed may be a missed edge.
-    if device is not None and device.glitches > MISSED * edges:
+    if device and device.glitches > MISSED * edges:
         yield make_reason("short_pulses", pulses=device.glitches)
+    if later := sum(edge.kind == "later passage" for edge in unmatched):
+        yield make_reason("later_passages", words, edges=later)
 
 
-def _air(fit: Fit) -> dict[str, tuple[Reason, ...]]:
-    """Return reasons about the fitted drag, by code; each is empty if drag is plausible.
-
-    ``air``: κ differs from the stated value. ``air_implausible``: κ is far from its prior and the
-    edges still do not fit, so that this is no fall. ``air_accelerates``: κ is negative, which is
-    not physical, so that some input is wrong.
-    """
-    model, estimate = fit.model, fit.estimate
+def _air(fit: Fit) -> Iterator[Reason]:
+    """Yield reasons about the fitted drag, unless it is plausible."""
+    model, estimate, words = fit.model, fit.estimate, fit.model.protocol.vocabulary
     at = model.unknowns["drag"].start
     off, sd = float(estimate.x[at]), float(estimate.sd[at])
     kappa = float(model.kappa(estimate.x))
     variance = float(estimate.inverse[at] @ estimate.inverse[at])
     u = math.sqrt(variance) * sd
-    # Estimate by the edges alone, without the prior.
-    share = 1.0 / (1.0 - min(variance, 0.9))
-    alone = {"kappa": kappa + (share - 1.0) * off, "U95": 2.0 * math.sqrt(share) * u}
-    blown = estimate.scatter > RESTLESS and abs(off) > APART * sd
-    table: dict[str, tuple[bool, dict[str, float]]] = {
-        "air": (model.protocol.drag is not None and abs(off) > STRAY * sd, alone),
-        "air_implausible": (blown, {"kappa": kappa, "factor": estimate.scatter}),
-        "air_accelerates": (kappa < -_SURE * u, {"kappa": kappa, "U95": 2.0 * u}),
-    }
-    words = model.protocol.vocabulary
-    return {
-        code: (make_reason(code, words, **values),) if holds else ()
-        for code, (holds, values) in table.items()
-    }
+    if model.protocol.drag is not None and abs(off) > STRAY * sd:
+        # Estimate by the edges alone, without the prior.
+        share = 1.0 / (1.0 - min(variance, 0.9))
+        by_edges, u95 = kappa + (share - 1.0) * off, 2.0 * math.sqrt(share) * u
+        yield make_reason("air", words, kappa=by_edges, U95=u95)
+    if estimate.scatter > RESTLESS and abs(off) > APART * sd:  # this is no fall
+        yield make_reason("air_implausible", words, kappa=kappa, factor=estimate.scatter)
+    if kappa < -_SURE * u:  # negative drag is not physical, so that some input is wrong
+        yield make_reason("air_accelerates", words, kappa=kappa, U95=2.0 * u)
