@@ -155,7 +155,6 @@ BENCHES = {
         _number("--mutants", "in all", 200),
         _option("--seed", type=int, default=1, help="which ones"),
         _option("--rooms", nargs="+", metavar="ROOM", help="only in these"),
-        _switch("--list", "only say which they are"),
     )),
     "pictures": Bench("pictures", "all pages of the terminal as SVG files", (
         _folder("write a file a page and size there"),

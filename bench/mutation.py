@@ -7,8 +7,6 @@ first, until one fails. Which those are is known from one run of all rooms' test
 from __future__ import annotations
 
 import ast
-import csv
-import hashlib
 import json
 import os
 import random
@@ -22,6 +20,7 @@ from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
 from queue import SimpleQueue
+from statistics import fmean
 from tempfile import TemporaryDirectory
 from time import monotonic
 from typing import TYPE_CHECKING, NamedTuple
@@ -48,8 +47,6 @@ _PATIENCE = 10.0
 _MOST_S = 40.0
 """What the tests of a fault may take together, without it."""
 _START_S = 120.0  # until pytest has loaded everything, on a busy machine
-
-
 ROOMS = {
     "analysis": ("rig/analysis", "rig/results"),
     "link": ("rig/link",),
@@ -107,11 +104,12 @@ class Reached:
     seconds
         Of each test.
     lines
-        For each file, tests by line; what runs only when a file is loaded has none.
+        For each file, tests by line, by their places; what runs only when a file is loaded has
+        none.
     """
 
     seconds: dict[str, float]
-    lines: dict[str, dict[int, set[str]]]
+    lines: dict[str, dict[str, list[int]]]
 
     def tests(self, path: str, line: int) -> list[str]:
         """List the tests that may notice a fault, the quickest first, until they take too long.
@@ -122,11 +120,11 @@ class Reached:
         """
         if not path.endswith(".py"):
             return [one for one in self.seconds if one.startswith(CORE_TESTS)]
-        by_line = self.lines.get(path, {})
-        whole = set().union(*by_line.values())
-        span = _within_a_function(path, line)
-        found = set().union(*(by_line.get(at, ()) for at in span))
-        ranked = sorted(found or whole or self.seconds, key=lambda one: (self.seconds[one], one))
+        by_line, names = self.lines.get(path, {}), [*self.seconds]
+        whole = set().union(*by_line.values()) or range(len(names))
+        span = map(str, _within_a_function(path, line))
+        found = set().union(*(by_line.get(at, ()) for at in span)) or whole
+        ranked = sorted((names[n] for n in found), key=lambda one: (self.seconds[one], one))
         spent = accumulate(self.seconds[one] for one in ranked)
         return [one for one, seconds in zip(ranked, spent, strict=True) if seconds <= _MOST_S]
 
@@ -149,22 +147,17 @@ def run(arguments: Namespace) -> Iterator[Findings]:
     """Put faults in and see what is noticed; it has failed when less than nine of ten were."""
     rooms = arguments.rooms or list(ROOMS)
     mutants = list(_sampled(rooms, arguments.mutants, arguments.seed))
-    if arguments.list:
-        yield Findings({"faults": [*map(str, mutants)]}, [*map(str, mutants)])
-        return
     copies: SimpleQueue[Path] = SimpleQueue()
     with TemporaryDirectory(prefix="rig-mutation-") as folder:
         for number in range(arguments.jobs):
             copies.put(_copied(Path(folder) / str(number)))
         outcomes = list(_tried(mutants, _reached(copies), copies, arguments.jobs))
     table = [["room", "faults", "noticed", "share"]]
-    table += [[room, *_counted(group)] for room, group in _by_room(outcomes)]
+    for room in [*ROOMS, "all"]:
+        by = [outcome.by != "" for outcome in outcomes if room in {"all", outcome.mutant.room}]
+        table += [[room, str(len(by)), str(sum(by)), f"{fmean(by):.0%}"]] if by else []
     survived = [outcome.mutant for outcome in outcomes if not outcome.by]
-    reasons = {(row["file"], row["old"], row["new"]): row["why"] for row in _survivors()}
-    lines = [*text_table(table, left={0}, rule=True), "", "not noticed, and why it may stay:"]
-    for mutant in survived:
-        why = reasons.get((mutant.path, mutant.fault.old, mutant.fault.new), "nobody knows")
-        lines.append(f"{mutant}: {why}")
+    lines = [*text_table(table, left={0}, rule=True), "", "not noticed:", *map(str, survived)]
     yield Findings(
         {"outcomes": [[*map(str, outcome)] for outcome in outcomes]},
         lines,
@@ -174,28 +167,8 @@ def run(arguments: Namespace) -> Iterator[Findings]:
     )
 
 
-def _by_room(outcomes: list[Outcome]) -> Iterator[tuple[str, list[Outcome]]]:
-    """Yield the outcomes of each room, then all."""
-    for room in [*ROOMS, "all"]:
-        group = [outcome for outcome in outcomes if room in {"all", outcome.mutant.room}]
-        if group:
-            yield room, group
-
-
-def _survivors() -> list[dict[str, str]]:
-    """Read which faults no test can or need notice, and why."""
-    text = Path(__file__).with_name("mutation_survivors.csv").read_text("utf-8")
-    return [*csv.DictReader(text.splitlines())]
-
-
-def _counted(some: list[Outcome]) -> list[str]:
-    noticed = sum(bool(one.by) for one in some)
-    return [str(len(some)), str(noticed), f"{noticed / len(some):.0%}"]
-
-
 def _sampled(rooms: list[str], count: int, seed: int) -> Iterator[Mutant]:
-    """Draw as many faults of each room, one by one in turn, so that fewer are the first of more."""
-    turns = []
+    """Draw as many faults of each room; fewer are the first of more."""
     for room in rooms:
         found = [
             Mutant(room, str(path.relative_to(ROOT)), fault)
@@ -204,12 +177,7 @@ def _sampled(rooms: list[str], count: int, seed: int) -> Iterator[Mutant]:
             for fault in (c_faults if room == "core" else python_faults)(path.read_text("utf-8"))
         ]
         random.Random(f"{room} {seed}").shuffle(found)
-        turns.append(found)
-    in_turn = (
-        some[n] for n in range(max(map(len, turns), default=0)) for some in turns if some[n:]
-    )
-    for one, _ in zip(in_turn, range(count), strict=False):
-        yield one
+        yield from found[: -(-count // len(rooms))]
 
 
 # ---------------------------------------------------------------- copies of the project
@@ -224,7 +192,7 @@ def _copied(place: Path) -> Path:
 
 def _reached(copies: SimpleQueue[Path]) -> Reached:
     """Read which tests run through which lines, or run them to find out."""
-    kept = KEPT / f"{_state()}.json"
+    kept = KEPT / f"{_last_change()}.json"
     if not kept.exists():
         KEPT.mkdir(parents=True, exist_ok=True)
         copy = copies.get()
@@ -239,22 +207,13 @@ def _reached(copies: SimpleQueue[Path]) -> Reached:
         for one in dict.fromkeys(_failed(told)):  # in a copy of the project
             say(f"left out, for it fails without any fault: {one}")
         kept.with_suffix(".new").replace(kept)
-    record = json.loads(kept.read_text("utf-8"))
-    names = [*record["seconds"]]
-    lines = {
-        path: {int(line): {names[one] for one in tests} for line, tests in by_line.items()}
-        for path, by_line in record["lines"].items()
-    }
-    return Reached(record["seconds"], lines)
+    return Reached(**json.loads(kept.read_text("utf-8")))
 
 
-def _state() -> str:
-    found = hashlib.sha256()
-    for folder in ("rig", "sim", "firmware", "tests"):
-        for path in sorted((ROOT / folder).rglob("*.[pchy]*")):
-            if path.is_file() and "__pycache__" not in path.parts:
-                found.update(path.read_bytes())
-    return found.hexdigest()[:12]
+def _last_change() -> int:
+    folders = (ROOT / name for name in ("rig", "sim", "firmware", "tests"))
+    paths = (path for folder in folders for path in folder.rglob("*.[pchy]*"))
+    return max(path.stat().st_mtime_ns for path in paths if path.suffix != ".pyc")
 
 
 def _pytest(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
+    from collections.abc import Iterator
 
     from coverage import Coverage
 
@@ -81,16 +81,20 @@ class _Recorder:
         places = {nodeid: place for place, nodeid in enumerate(self._seconds)}
         lines: dict[str, dict[int, list[int]]] = {
             str(Path(file).relative_to(here)): {
-                line: [places[one] for one in self._seconds.keys() & self._tests(contexts)]
+                line: sorted(
+                    {
+                        places[test]
+                        for context in contexts
+                        for test in self._users.get(context, {context})
+                        if test in places
+                    }
+                )
                 for line, contexts in data.contexts_by_lineno(file).items()
             }
             for file in sorted(data.measured_files())
         }
         record: dict[str, Any] = {"seconds": self._seconds, "lines": lines}
         self._target.write_text(json.dumps(record), "utf-8")
-
-    def _tests(self, contexts: Iterable[str]) -> set[str]:
-        return set().union(*(self._users.get(one, {one}) for one in contexts))
 
 
 class _Selection:
