@@ -147,7 +147,14 @@ def suspects(records: Collection[ChainRecord], matches: Matches | None = None) -
 
 
 def _are_crossed(one: GateCount, other: GateCount) -> bool:
-    """Whether the numbers of edges of two gates rather match each other's expectation."""
+    """Whether the numbers of edges of two gates rather match each other's expectation.
+
+    The gate with too few edges must lack a rod at an end of the chain; by chance, missed rods may
+    be anywhere.
+    """
+    fewer, more = sorted((one, other), key=lambda gate: gate.surplus)
+    if more.surplus < SIDES or np.isin(fewer.train.rods[[0, -1]], fewer.seen).all():
+        return False
     came, due = (one.train.times.size, other.train.times.size), (one.match.size, other.match.size)
     own = abs(came[0] - due[0]) + abs(came[1] - due[1])
     return own - abs(came[0] - due[1]) - abs(came[1] - due[0]) >= 2 * SIDES
