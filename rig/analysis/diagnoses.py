@@ -7,7 +7,7 @@ possible causes.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
-from itertools import combinations
+from itertools import product
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -136,7 +136,8 @@ def suspects(records: Collection[ChainRecord], matches: Matches | None = None) -
     counts = gate_counts(records, matches)
     worst = sorted(counts, key=lambda gate: -gate.missing - gate.surplus)
     worst = worst[: FEW // 2 if matches else FEW]
-    absent, more = {}, any(_are_crossed(*pair) for pair in combinations(counts, 2))
+    crowded = [gate for gate in counts if gate.surplus >= SIDES]
+    absent, more = {}, any(_are_crossed(*pair) for pair in product(counts, crowded))
     for record in records if matches else ():
         if gates := [gate for gate in counts if gate.role == record.role]:
             due = {rod for gate in gates for rod in gate.train.rods.tolist()}
@@ -149,11 +150,10 @@ def suspects(records: Collection[ChainRecord], matches: Matches | None = None) -
 def _are_crossed(one: GateCount, other: GateCount) -> bool:
     """Whether the numbers of edges of two gates rather match each other's expectation.
 
-    The gate with too few edges must lack a rod at an end of the chain; by chance, missed rods may
+    The first gate, with too few, must lack a rod at an end of the chain; by chance, missed rods may
     be anywhere.
     """
-    fewer, more = sorted((one, other), key=lambda gate: gate.surplus)
-    if more.surplus < SIDES or np.isin(fewer.train.rods[[0, -1]], fewer.seen).all():
+    if np.isin(one.train.rods[[0, -1]], one.seen).all():
         return False
     came, due = (one.train.times.size, other.train.times.size), (one.match.size, other.match.size)
     own = abs(came[0] - due[0]) + abs(came[1] - due[1])

@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ from rig.analysis.annealing import MISSED
 from rig.analysis.chain_records import ChainRecord, chain_records
 from rig.analysis.components import Components
 from rig.analysis.diagnoses import RIGHT
+from rig.analysis.drop_model import DropModel
 from rig.analysis.faults import Fault, Premise, Suspects, faults
 from rig.analysis.fit import Fit, settle
 from rig.analysis.identify import (
@@ -201,7 +202,9 @@ class Explainer:
     def _score_odds(self, fit: Fit, premise: Premise) -> Array:
         """Return the log odds of each continuous fault by its score, without its prior's cost."""
         sized, _ = self._faults
-        test = scores(fit, [fault.direction(premise, fit.model) for fault in sized])
+        asked = _Directions(fit.model.condition, sized, premise, fit.model)
+        is_stated = premise is self.stated and not fit.model.suspects
+        test = scores(fit, _stated_directions(asked) if is_stated else asked.vectors)
         # The Occam factor: ln of the prior range of a size over its posterior width.
         widths = math.sqrt(2.0 * math.pi) * test.u
         spans = np.array([fault.span for fault in sized])
@@ -317,6 +320,26 @@ class Explainer:
         evidence = self._evidence(reading, premise.hz) - CLEAR - occam
         complete = well_read(reading.fit) and not self._suggests_fault(reading.fit, premise)
         return Explanation(fault, values, evidence, complete)
+
+
+@dataclass(frozen=True)
+class _Directions:
+    """Cache key: continuous faults have the same directions in all drops of a condition."""
+
+    condition: object
+    faults: Sequence[Fault] = field(compare=False)
+    premise: Premise = field(compare=False)
+    model: DropModel = field(compare=False)
+
+    @property
+    def vectors(self) -> list[Array]:
+        """Direction of each fault, see `Fault.direction`."""
+        return [fault.direction(self.premise, self.model) for fault in self.faults]
+
+
+@lru_cache(maxsize=32)
+def _stated_directions(asked: _Directions) -> list[Array]:
+    return asked.vectors
 
 
 def _evidence(cause: Explanation) -> float:
