@@ -72,14 +72,18 @@ class CacheFolder:
     def size(self) -> CacheSize | None:
         """Return how much is kept; `None` where no cache can be used."""
         with suppress(OSError):
-            sizes = [file.stat().st_size for file in self._private_folder().glob("*/*")]
+            sizes = [file.stat().st_size for part in self._parts() for file in part.iterdir()]
             return CacheSize(len(sizes), sum(sizes))
         return None
 
     def clear(self) -> None:
-        """Forget everything."""
+        """Forget everything; other files of the folder, such as a daemon's socket, stay."""
         with suppress(OSError):
-            shutil.rmtree(self._private_folder())
+            for part in self._parts():
+                shutil.rmtree(part)
+
+    def _parts(self) -> list[Path]:
+        return [*self._private_folder().glob("[0-9a-f]")]
 
     def _file(self, key: str) -> Path:
         name = sha256(key.encode()).hexdigest()

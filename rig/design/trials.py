@@ -98,7 +98,7 @@ def _fall(protocol: Protocol, run: Run, rng: np.random.Generator) -> list[ChainR
     for role, record in model.records.items():
         for name in ("rods", "width", "hang"):
             shake(f"{role} {name}")
-        x[at[f"{role} release"]] = 0.5 * protocol.accept.release_skew * rng.uniform(-1.0, 1.0)
+        x[at[f"{role} release"]] += 0.5 * protocol.accept.release_skew * rng.uniform(-1.0, 1.0)
         if record.ratios is not None:
             shake("impulses")
         shake("datum", protocol.gates.posts.index(record.role))

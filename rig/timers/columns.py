@@ -193,6 +193,7 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
         "timed": unit in POWERS,
         "volt": unit == "v",
         "unitless": not unit,
+        "strange": unit not in {*POWERS, "v", ""} and not find_label(unit, "gate"),
         "bare": not name,
         "first": not n,
         "labelled": column.gate,
@@ -214,10 +215,13 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
 
 
 def _cell_above(row: Row, n: int) -> str:
-    """Return the cell of a row above the heading; of merged cells only the first has a text."""
-    is_grouped = sum(bool(find_label(text, "gate")) for text in row.texts) > 1
-    cells = row.texts[: n + 1] if is_grouped else [row.cell(n)]
-    return next(filter(None, reversed(cells)), "")
+    """Return the cell of a row above the heading; of merged cells only the first has a text.
+
+    The last of them is as wide as the widest other: what is beyond belongs to none.
+    """
+    grouped = [at for at, text in enumerate(row.texts) if find_label(text, "gate")]
+    width = max((b - a for a, b in itertools.pairwise(grouped)), default=1)
+    return next(filter(None, reversed(row.texts[max(0, n + 1 - width) : n + 1])), "")
 
 
 def _facts_of_values(texts: Sequence[str]) -> set[str]:

@@ -18,6 +18,16 @@ _START = 4096
 """Bytes that show the encoding, or that this is no text."""
 
 
+def _decode_as_windows(fault: UnicodeError) -> tuple[str, int]:
+    """Read bytes that are no UTF-8 as Windows writes them, wherever they stand."""
+    if not isinstance(fault, UnicodeDecodeError):
+        raise fault
+    return fault.object[fault.start : fault.end].decode("cp1252", "replace"), fault.end
+
+
+codecs.register_error("windows", _decode_as_windows)
+
+
 def read_lines(path: str | Path) -> Generator[str]:
     """Yield the lines of a text file: UTF-8, UTF-16 with its mark and without, or Windows'.
 
@@ -43,9 +53,7 @@ def read_lines(path: str | Path) -> Generator[str]:
             encoding = "utf-16-be" if zeros[0] else "utf-16-le"
         elif b"\0" in start:
             problems.refuse(1, 1, "not_text")
-        elif "\ufffd" in start.decode("utf-8", "replace").rstrip("\ufffd"):
-            encoding = "cp1252"
-        with Path(path).open(encoding=encoding, errors="replace") as stream:
+        with Path(path).open(encoding=encoding, errors="windows") as stream:
             read_line = partial(stream.readline, LONGEST_LINE)
             for number, line in enumerate(iter(read_line, ""), 1):
                 if len(line) == LONGEST_LINE:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import date
 from decimal import ROUND_HALF_EVEN, Context
 from fractions import Fraction
 
@@ -35,14 +36,19 @@ def moment(text: str, power: int = 0) -> int | None:
     if ":" not in text or (match := form("clock").fullmatch(text)) is None:
         return picoseconds(text, -power)
     first, mark, second, third, hours, minutes, rest = match.groups("0")
-    parts = [int(first), int(second), int(third)]
-    year, month, day = parts if len(first) > 2 else parts[::-1]
-    if mark == "/" and parts[0] <= 12:
-        month, day = parts[:2]
-    # Days have to be apart and in order only: months may all have 31.
-    hour = ((year * 12 + month) * 31 + day) * 24 + int(hours)
+    days = 0
+    if int(third):
+        # Only how many days lie between two times matters: which part is the year is enough.
+        parts = [int(first), int(second), int(third)]
+        year, month, day = parts if len(first) > 2 else parts[::-1]
+        if mark == "/" and parts[0] <= 12:
+            month, day = parts[:2]
+        try:
+            days = date(year, month, day).toordinal()
+        except ValueError:
+            return None
     ticks = picoseconds(rest.replace(",", ".")) or 0
-    return (60 * hour + int(minutes)) * 60 * TICK_HZ + ticks
+    return (60 * (24 * days + int(hours)) + int(minutes)) * 60 * TICK_HZ + ticks
 
 
 def picoseconds(text: str, power: int = 0) -> int | None:

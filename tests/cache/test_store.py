@@ -49,6 +49,14 @@ def test_what_was_put_last_is_there(cache):
     assert (cache.get("a"), cache.size().entries) == (None, 0)
 
 
+def test_what_stands_beside_it_stays(cache):
+    """Without XDG_RUNTIME_DIR a daemon has its socket in the same folder."""
+    cache.put("a", "1")
+    (cache.folder / "rig.sock").touch()
+    cache.clear()
+    assert [file.name for file in cache.folder.iterdir()] == ["rig.sock"]
+
+
 def test_it_is_for_this_user_alone(cache):
     cache.put("a", "1")
     assert cache.folder.stat().st_mode & 0o777 == 0o700

@@ -13,13 +13,14 @@ from rig.analysis.components import Components, priors
 from rig.design.cases import BEAM, cases, with_gates
 from rig.design.forecast import Forecast, GateLayout, forecast
 from rig.design.search import Room, better, score
-from rig.design.trials import Trials, readable, trials, trials_text
+from rig.design.trials import DROPS, Trials, readable, trials, trials_text
 from rig.estimate.coefficients import best, coefficient_problem
 from rig.estimate.hypotheses import model_alpha
 from rig.estimate.quadratic_forms import merge_like
 from rig.protocol import reader
 from rig.protocol.protocol import Gate, Gates, Plan, Priors, Protocol
 from rig.protocol.reader import parse
+from rig.ready import find_protocol
 from rig.vocabulary import OBJECT, TWO_CHAINS
 from tests.analysis.drops import SINGLE, UNIFORM
 from tests.analysis.test_datum_board import from_board, raised
@@ -112,6 +113,12 @@ def test_low_beams_alone_are_read_too():
     steep = parse(from_board(raised(UNIFORM.text, 25.0)).replace("10 deg, 40 deg, 50", "60"))
     assert readable(steep)
     assert trials(LOW, 6) == Trials(6, 6)
+
+
+def test_trial_drops_are_let_go_when_a_board_lets_go():
+    """A rig that records from its release on has no drop that was let go before."""
+    ball = reader.read(find_protocol("falling-ball"))
+    assert trials(ball) == Trials(DROPS, DROPS)
 
 
 def test_trials_that_fail_name_the_side_and_a_gate():

@@ -56,6 +56,9 @@ def strangers() -> dict[str, Shape]:
         ("Gates over pairs of columns", "," + ",,".join(f"Gate {g}" for g in HEIGHTS) + ",\n"
          + "Run," + ",".join(["in (s),out (s)"] * len(HEIGHTS)) + "\n"
          + table([n, *(f"{t:.6f}" for t, _, _ in edges)] for n, edges in enumerate(RUNS, 1))),
+        ("A sum beside pairs of columns", ",,".join(f"Gate {g}" for g in HEIGHTS) + ",,\n"
+         + ",".join(["in (s),out (s)"] * len(HEIGHTS)) + ",all (s)\n"
+         + table([*(f"{t:.6f}" for t, _, _ in edges), "0.3"] for edges in RUNS)),
         ("A name for two columns", "run," + ",,".join(f"Gate {g} (s)" for g in HEIGHTS) + ",\n"
          + table([n, *(f"{t:.6f}" for t, _, _ in edges)] for n, edges in enumerate(RUNS, 1))),
         ("Times of a row, numbered", "drop," + ",".join(f"t{k}" for k in range(1, 9)) + "\n"
@@ -100,6 +103,10 @@ def strangers() -> dict[str, Shape]:
         ("JSON, a list of lines", "[\n" + ",\n".join(
             f'{{"gate": {c}, "ts_ns": {t * 1e9:.0f}, "blocked": {str(d).lower()}}}'
             for t, c, d in one) + "\n]\n"),
+        ("A month that ends", "gate,time,state\n" + "".join(
+            f"{c},2026-{'11-30 23:59' if t < 0.5 else '12-01 00:00'}:{(t - 0.5) % 60:.6f}"
+            f",{int(d)}\n" for t, c, d in one)),
+        ("Seconds that are called minutes", GTS.replace("(s)", "(min)") + each[0]),
         ("A clock before values", write("14:03:2{s} -> {c},{d},{us}\n")),
         ("Clear or not", GTS.replace("state", "clear") + write("{c},{s},{no}\n")),
         ("A word for states that is unknown", "tijd (ms);sensor;toestand\n"
@@ -108,6 +115,8 @@ def strangers() -> dict[str, Shape]:
         ("The last row cut", GTS + each[0][:-3]),
     ):  # fmt: skip
         put(name, content)
+    late = "# of a timer\n" * 400 + GTS.replace("(s)", "(µs)") + write("{c},{us},{d}\n")
+    files["Letters of Windows far below"] = Shape(late.encode("cp1252"), RUNS[:1])
     put("Durations", "gate,time in gate (s)\n" + table(
         [c, f"{b[0] - a[0]:.6f}"] for c, (a, b) in by_gate(one).items()), [])  # fmt: skip
     put("Start and duration", "gate,start (s),duration (s)\n" + table(
@@ -198,7 +207,7 @@ NOT_READ = {
     "Runs by a word alone", "Written by hand",
     "States the other way round", "A channel for all gates", "Samples of a channel for all gates",
     "Durations", "A summary below", "A word below", "A name for two columns",
-    "Minutes and seconds",
+    "Minutes and seconds", "Seconds that are called minutes",
     "More names than columns", "Samples with an index",
     "Two tables", "Twice the same", "Changes in nanoseconds", "Thousands apart",
     "Thousands by points", "Microseconds as if they were seconds",
