@@ -66,8 +66,11 @@ class CacheFolder:
                 shutil.rmtree(file.parent)
                 file.parent.mkdir()
             begun = file.with_suffix(f".{os.getpid()}")
-            begun.write_bytes(packed)
-            begun.replace(file)
+            try:
+                begun.write_bytes(packed)
+                begun.replace(file)
+            finally:  # a full disk gets its room back
+                begun.unlink(missing_ok=True)
 
     def size(self) -> CacheSize | None:
         """Return how much is kept; `None` where no cache can be used."""
@@ -79,7 +82,9 @@ class CacheFolder:
     def clear(self) -> None:
         """Forget everything."""
         with suppress(OSError):
-            shutil.rmtree(self._private_folder())
+            folder = self._private_folder().resolve()  # a link to it stays, and leads somewhere
+            shutil.rmtree(folder)
+            folder.mkdir(mode=0o700)
 
     def _file(self, key: str) -> Path:
         name = sha256(key.encode()).hexdigest()
