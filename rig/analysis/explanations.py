@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rig.analysis.annealing import MISSED
+from rig.analysis.annealing import LEAST, MISSED
 from rig.analysis.chain_records import ChainRecord, chain_records
 from rig.analysis.components import Components
 from rig.analysis.diagnoses import RIGHT
@@ -157,9 +157,11 @@ class Explainer:
         """Yield faults that may explain the drop, and the hypothesis that there is none."""
         sized, discrete = self._faults
         if fit is None:
-            evidence = sum(map(self._read_alone, self._records(self.stated)))
-            yield Explanation(_NEITHER, {}, evidence)
-            yield from self._by_votes([*sized, *discrete])
+            records = self._records(self.stated)
+            yield Explanation(_NEITHER, {}, sum(map(self._read_alone, records)))
+            # Too few edges for any fall would only fit a chain with fewer rods.
+            if all(possible(record) >= LEAST * record.edge_count for record in records):
+                yield from self._by_votes([*sized, *discrete])
             return
         stated = Explanation(_NEITHER, {}, self._evidence(weigh(fit), self.stated.hz))
         causes = [stated, *self._along(fit), *self._by_votes(discrete)]
