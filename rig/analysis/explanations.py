@@ -37,6 +37,7 @@ from rig.analysis.identify import (
 from rig.analysis.last_passages import APART
 from rig.analysis.score_test import scores
 from rig.analysis.unknowns import prior_air
+from rig.analysis.verdict import is_wrong
 from rig.arrays import Array
 from rig.reasons import Reason, make_reason
 from rig.records import Drop
@@ -144,7 +145,8 @@ class Explainer:
 
     def _is_odd(self, fit: Fit, reasons: Sequence[Reason]) -> bool:
         """Whether a fault is searched for, which takes longer than all the rest."""
-        if any(reason.code in _ACCUSING for reason in reasons) or not well_read(fit):
+        accusing = any(reason.code in _ACCUSING for reason in reasons)
+        if accusing or is_wrong(reasons) or not well_read(fit):
             return True
         rods = any(self.suspects.rods.values()) or self.suspects.more
         return rods or self._suggests_fault(fit, self.stated)
