@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rig.analysis.annealing import MISSED
+from rig.analysis.annealing import LEAST, MISSED
 from rig.analysis.chain_records import ChainRecord, chain_records
 from rig.analysis.components import Components
 from rig.analysis.diagnoses import RIGHT
@@ -38,6 +38,7 @@ from rig.analysis.identify import (
 from rig.analysis.last_passages import APART
 from rig.analysis.score_test import scores
 from rig.analysis.unknowns import prior_air
+from rig.analysis.verdict import is_wrong
 from rig.arrays import Array
 from rig.reasons import Reason, make_reason
 from rig.records import Drop
@@ -131,7 +132,7 @@ class Explainer:
         ranked = [*{id(cause.fault): cause for cause in sorted(causes, key=_evidence)}.values()]
         ranked.sort(key=_evidence, reverse=True)
         neither = next(cause.evidence for cause in ranked if cause.fault is _NEITHER)
-        if ranked[0].evidence < neither + CLEAR:
+        if ranked[0].fault is _NEITHER or ranked[0].evidence < neither + CLEAR:
             return (*reasons,)
         best, rival, *_ = ranked
         words, lead = self.stated.protocol.vocabulary, best.evidence - rival.evidence
@@ -145,7 +146,8 @@ class Explainer:
 
     def _is_odd(self, fit: Fit, reasons: Sequence[Reason]) -> bool:
         """Whether a fault is searched for, which takes longer than all the rest."""
-        if any(reason.code in _ACCUSING for reason in reasons) or not well_read(fit):
+        accusing = any(reason.code in _ACCUSING for reason in reasons)
+        if accusing or is_wrong(reasons) or not well_read(fit):
             return True
         rods = any(self.suspects.rods.values()) or self.suspects.more
         return rods or self._suggests_fault(fit, self.stated)
@@ -158,9 +160,11 @@ class Explainer:
         """Yield faults that may explain the drop, and the hypothesis that there is none."""
         sized, discrete = self._faults
         if fit is None:
-            evidence = sum(map(self._read_alone, self._records(self.stated)))
-            yield Explanation(_NEITHER, {}, evidence)
-            yield from self._by_votes([*sized, *discrete])
+            records = self._records(self.stated)
+            yield Explanation(_NEITHER, {}, sum(map(self._read_alone, records)))
+            # Too few edges for any fall would only fit a chain with fewer rods.
+            if all(possible(record) >= LEAST * record.edge_count for record in records):
+                yield from self._by_votes([*sized, *discrete])
             return
         stated = Explanation(_NEITHER, {}, self._evidence(weigh(fit), self.stated.hz))
         causes = [stated, *self._along(fit), *self._by_votes(discrete)]

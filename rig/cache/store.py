@@ -66,8 +66,11 @@ class CacheFolder:
                 shutil.rmtree(file.parent)
                 file.parent.mkdir()
             begun = file.with_suffix(f".{os.getpid()}")
-            begun.write_bytes(packed)
-            begun.replace(file)
+            try:
+                begun.write_bytes(packed)
+                begun.replace(file)
+            finally:  # a full disk gets its room back
+                begun.unlink(missing_ok=True)
 
     def size(self) -> CacheSize | None:
         """Return how much is kept; `None` where no cache can be used."""

@@ -11,11 +11,18 @@ from __future__ import annotations
 from rig.analysis.result import DropResult
 from rig.analysis.session import Analysis
 from rig.measurands import RELEASE_SKEW
+from rig.reasons import make_reason
+
+_TELLING = ("last_speed_differs", "last_separation_differs", "other_incline")
+"""Reasons that state measured values; none makes a drop void."""
 
 
 def veiled_drop(result: DropResult) -> DropResult:
     """Return what may be seen of a drop's result: all but measured values."""
-    drop = result.run, result.attempt, result.verdict, result.reasons, result.audit
+    shown = [reason for reason in result.reasons if reason.code not in _TELLING]
+    if any(reason.code in _TELLING[:2] for reason in result.reasons):
+        shown.append(make_reason("last_passages_differ"))
+    drop = result.run, result.attempt, result.verdict, (*shown,), result.audit
     skews = {name: m for name, m in result.quantities.items() if name == RELEASE_SKEW.name}
     scatter, limits, damaged = result.scatter, result.limits, result.damaged
     return DropResult(*drop, skews, scatter=scatter, limits=limits, damaged=damaged)

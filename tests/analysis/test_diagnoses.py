@@ -52,6 +52,27 @@ def test_a_chain_that_hangs_a_rod_s_distance_higher_has_no_rod_too_many():
     assert abs(named.values["size_m"] - pitch) < named.values["U95_m"]
 
 
+def test_gates_exchanged_that_leave_edges_unexplained_are_said():
+    """Few rods, of which nearly as many edges fit the wrong gates."""
+    text = UNIFORM.text.replace("rods: 25", "rods: 6").replace("1165 mm", "242.5 mm")
+    others = [f"channel: {channel}," for channel in (1, 4, 5, 6, 7, 9, 10, 12, 13, 14, 15)]
+    lines = [line for line in text.splitlines() if not any(map(line.count, others))]
+    dials = Dials(skew_sd=1e-3, chatter=0.0, bounce=0.3)
+    one = case(parse("\n".join(lines)), dials, incline=10.0, seed=249)
+    assert codes(exchanged(one, 0, 2).analyze())[-1] == "gates_exchanged"
+
+
+def test_too_few_edges_for_any_fall_are_no_sign_of_fewer_rods():
+    """A short chain, of whose three gates one is silent, and the others missed some edges."""
+    text = UNIFORM.text.replace("rods: 25", "rods: 4").replace("1165 mm", "145.5 mm")
+    higher = [f"channel: {channel}," for channel in (4, 5, 6, 7, 11, 12, 13, 14, 15)]
+    lines = [line for line in text.splitlines() if not any(map(line.count, higher))]
+    dials = Dials(skew_sd=1e-3, missed=0.1)
+    one = case(parse("\n".join(lines)), dials, incline=40.0, seed=5)
+    result = one.with_edges([edge for edge in one.drop.edges if edge.channel != 8]).analyze()
+    assert codes(result) == ["few_edges_fit", "gate_silent"]
+
+
 def test_what_looks_the_same_both_ways_is_no_fault():
     for scene in (UNIFORM, GRADED):
         rods = rods_of(scene.chains["A"])

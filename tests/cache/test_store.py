@@ -1,5 +1,6 @@
 """The cache: what was kept comes back, from a file that anything may happen to."""
 
+import errno
 import os
 import signal
 import subprocess
@@ -55,6 +56,26 @@ def test_what_stands_beside_it_stays(cache):
     (cache.folder / "rig.sock").touch()
     cache.clear()
     assert [file.name for file in cache.folder.iterdir()] == ["rig.sock"]
+
+
+def test_behind_a_link_it_is_forgotten_and_used_again(tmp_path, cache):
+    (tmp_path / "elsewhere").mkdir(mode=0o700)
+    cache.folder.symlink_to(tmp_path / "elsewhere")
+    cache.put("a", "1")
+    cache.clear()
+    assert (cache.get("a"), cache.size().entries) == (None, 0)
+    cache.put("a", "2")
+    assert cache.get("a") == "2"
+
+
+def test_what_a_full_disk_cut_off_takes_no_room(cache, monkeypatch):
+    def write_half(path, data):
+        path.write_text("half")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("pathlib.Path.write_bytes", write_half)
+    cache.put("a", "1")
+    assert (cache.get("a"), cache.size().used_bytes) == (None, 0)
 
 
 def test_it_is_for_this_user_alone(cache):

@@ -13,8 +13,9 @@ from rig.analysis.drop import DropCase
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.session import analyze
 from rig.clock.calibration import TimeScale
-from rig.reasons import plain_reason
+from rig.reasons import make_reason, plain_reason
 from rig.records import Job
+from rig.results.blind import veiled_drop
 from rig.results.improvements import improvements
 from rig.results.known_drops import KnownDrops
 from rig.results.live import LiveAnalysis
@@ -150,3 +151,14 @@ def test_what_is_measured_better_brings_at_least_what_was_promised():
     assert again.means[name].expanded < 1.02 * promised.then < 1.02 * promised.now
     assert promised.sentence.startswith("If the ")
     assert promised.json()["U95_at_most"] == promised.then
+
+
+def test_reasons_of_a_blind_session_state_no_measured_value():
+    values = {"alone_m_s": 6.5, "alone_U95": 0.1, "whole_m_s": 6.9, "whole_U95": 0.1}
+    alone = make_reason("last_speed_differs", **values)
+    angles = {"likelier_deg": 50.0, "stated_deg": 40.0}
+    incline = make_reason("other_incline", alpha=0.1234, U95=0.01, **angles)
+    shown = veiled_drop(replace(case(UNIFORM).analyze(), reasons=(alone, incline)))
+    assert [reason.code for reason in shown.reasons] == ["last_passages_differ"]
+    assert "6.5" in alone.text
+    assert not any(number in str(shown.reasons) for number in ("6.5", "6.9", "0.12"))
