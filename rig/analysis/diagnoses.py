@@ -74,6 +74,11 @@ class GateCount(NamedTuple):
         return self.train.rods[self.match >= 0]
 
     @property
+    def lacks_end(self) -> bool:
+        """Whether it did not see the first or the last rod; by chance, it may be any."""
+        return not np.isin(self.train.rods[[0, -1]], self.seen).all()
+
+    @property
     def is_strange(self) -> bool:
         """Whether it disagrees with its chain."""
         return self.share < STRANGE or (self.share < RIGHT and self.missing > FEW)
@@ -137,7 +142,9 @@ def suspects(records: Collection[ChainRecord], matches: Matches | None = None) -
     worst = sorted(counts, key=lambda gate: -gate.missing - gate.surplus)
     worst = worst[: FEW // 2 if matches else FEW]
     crowded = [gate for gate in counts if gate.surplus >= SIDES]
-    absent, more = {}, any(_are_crossed(*pair) for pair in product(counts, crowded))
+    lacking = [gate for gate in counts if gate.lacks_end]
+    absent, more = {}, any(_are_crossed(*pair) for pair in product(lacking, crowded))
+    more |= sum(gate.lacks_end for gate in crowded) > 1
     for record in records if matches else ():
         if gates := [gate for gate in counts if gate.role == record.role]:
             due = {rod for gate in gates for rod in gate.train.rods.tolist()}
@@ -148,13 +155,7 @@ def suspects(records: Collection[ChainRecord], matches: Matches | None = None) -
 
 
 def _are_crossed(one: GateCount, other: GateCount) -> bool:
-    """Whether the numbers of edges of two gates rather match each other's expectation.
-
-    The first gate, with too few, must lack a rod at an end of the chain; by chance, missed rods may
-    be anywhere.
-    """
-    if np.isin(one.train.rods[[0, -1]], one.seen).all():
-        return False
+    """Whether the numbers of edges of two gates rather match each other's expectation."""
     came, due = (one.train.times.size, other.train.times.size), (one.match.size, other.match.size)
     own = abs(came[0] - due[0]) + abs(came[1] - due[1])
     return own - abs(came[0] - due[1]) - abs(came[1] - due[0]) >= 2 * SIDES

@@ -134,8 +134,8 @@ class Suspects(NamedTuple):
     rods
         Numbers of the rods that no gate saw, by chain; the lowest is 0.
     more
-        Whether all gates of a chain have edges after its last rod, or two gates have as many edges
-        as the other should.
+        Whether all gates of a chain have edges after its last rod, or two gates may have each
+        other's edges.
     """
 
     gates: Sequence[int] = ()
