@@ -23,7 +23,8 @@ from rig.reasons import Reason, make_reason
 
 APART = 3.0
 """Standard uncertainties beyond which two values differ: by chance in 1 of 370."""
-_CODES = {"speed_m_s": "last_speed_differs", "separation_raw_m": "last_separation_differs"}
+CODES = {"speed_m_s": "last_speed_differs", "separation_raw_m": "last_separation_differs"}
+"""Code of the reason that each quantity by the last passages differs, by JSON name."""
 
 
 def last_passages(fit: Fit) -> dict[str, Measured]:
@@ -44,7 +45,7 @@ def last_passages(fit: Fit) -> dict[str, Measured]:
     )
     step, inverse = root.step(), np.linalg.inv(root.matrix)
     drop, values = AdjustedDrop(model, estimate.x), {}
-    for name in _CODES:
+    for name in CODES:
         value = COMPUTED[name](drop)
         if value is not None:
             slopes = value.slopes * sd
@@ -57,11 +58,11 @@ def disagreements(
     fitted: Mapping[str, Measured], direct: Mapping[str, Measured]
 ) -> Iterator[Reason]:
     """Yield reasons for values of the last passages that differ from those of the fit."""
-    for name in [name for name in _CODES if name in fitted and name in direct]:
+    for name in [name for name in CODES if name in fitted and name in direct]:
         whole, alone = fitted[name], direct[name]
         # Both share the errors of the last edges, so that this limit is conservative.
         if abs(whole.value - alone.value) > APART * math.hypot(whole.u, alone.u):
             unit = name.removeprefix(MEASURANDS[name].stem)
             values = {f"alone{unit}": alone.value, f"whole{unit}": whole.value}
             values |= {"alone_U95": alone.expanded, "whole_U95": whole.expanded}
-            yield make_reason(_CODES[name], **values)
+            yield make_reason(CODES[name], **values)

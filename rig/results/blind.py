@@ -8,19 +8,20 @@ all code that shows results.
 
 from __future__ import annotations
 
+from rig.analysis.last_passages import CODES
 from rig.analysis.result import DropResult
 from rig.analysis.session import Analysis
 from rig.measurands import RELEASE_SKEW
 from rig.reasons import make_reason
 
-_TELLING = ("last_speed_differs", "last_separation_differs", "other_incline")
+_TELLING = {*CODES.values(), "other_incline"}
 """Reasons that state measured values; none makes a drop void."""
 
 
 def veiled_drop(result: DropResult) -> DropResult:
     """Return what may be seen of a drop's result: all but measured values."""
     shown = [reason for reason in result.reasons if reason.code not in _TELLING]
-    if any(reason.code in _TELLING[:2] for reason in result.reasons):
+    if any(reason.code in CODES.values() for reason in result.reasons):
         shown.append(make_reason("last_passages_differ"))
     drop = result.run, result.attempt, result.verdict, (*shown,), result.audit
     skews = {name: m for name, m in result.quantities.items() if name == RELEASE_SKEW.name}

@@ -289,5 +289,5 @@ def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list
     numbered = sorted(labels, key=lambda label: (number_of(label) or 0, label))
     chosen = [*itertools.combinations(gates, len(labels))][:_MOST_MAPS]
     maps = [dict(zip(numbered, sorted(beams), strict=True)) for beams in chosen[:1]]
-    maps += [dict(zip(passed, beams, strict=True)) for beams in chosen]
+    maps += [x for beams in chosen if (x := dict(zip(passed, beams, strict=True))) != maps[0]]
     return maps or [by_number] * bool(by_number)
