@@ -17,7 +17,7 @@ from rig.analysis.chain_records import SIDES, ChainRecord, EdgeTrain
 from rig.analysis.distributions import most_by_chance
 from rig.analysis.equations import STRAY, standardise
 from rig.analysis.faults import Suspects, gate_values
-from rig.analysis.fit import Begun, Fit, Matches
+from rig.analysis.fit import Fit, Matches
 from rig.arrays import Index
 from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, make_reason
@@ -167,7 +167,7 @@ def _values(protocol: Protocol, train: EdgeTrain) -> dict[str, Any]:
 
 
 def gates_too_low(
-    protocol: Protocol, records: Iterable[ChainRecord], begun: Begun | None
+    protocol: Protocol, records: Iterable[ChainRecord], fit: Fit | None
 ) -> tuple[int, ...]:
     """Return the lowest gates beside the striking chain that miss more rods than by chance.
 
@@ -178,7 +178,7 @@ def gates_too_low(
     ----------
     records
         The chains with their trains.
-    begun
+    fit
         `None` if the drop is not identified: then the number of edges is used.
 
     Returns
@@ -187,7 +187,7 @@ def gates_too_low(
         Numbers of the gates in the protocol's list.
     """
     assert protocol.gates is not None
-    counts = gate_counts(records, None if begun is None else begun.matches)
+    counts = gate_counts(records, None if fit is None else fit.matches)
     due, hidden = sum(gate.due for gate in counts), sum(gate.hidden for gate in counts)
     struck, gates = [gate for gate in counts if gate.role == "impact"], protocol.gates.gates
     low: list[int] = []

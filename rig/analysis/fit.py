@@ -15,6 +15,15 @@ from rig.arrays import Array, Index
 
 Matches = dict[str, Index]
 
+
+class Begun(NamedTuple):
+    """α, matches and unknowns of a drop, without its model."""
+
+    alpha: float
+    matches: Matches
+    x: Array
+
+
 CLOSE = 0.1
 """Length of a drop's last step in standard uncertainties; convergence is quadratic. With half of it
 no result changes by 0.001 standard uncertainties."""
@@ -45,6 +54,11 @@ class DropFit:
     x: Array
 
     @property
+    def begun(self) -> Begun:
+        """What a fit of the drop at another time scale begins with."""
+        return Begun(self.model.alpha, self.matches, self.x)
+
+    @property
     def match_count(self) -> int:
         """Number of matched edges."""
         return sum(map(count_matched, self.matches.values()))
@@ -70,11 +84,6 @@ class Fit(DropFit):
     """A drop fitted by itself."""
 
     estimate: Estimate
-
-    @property
-    def begun(self) -> Begun:
-        """What another fit of the drop begins with."""
-        return Begun(self.model.alpha, self.matches, self.x, self.estimate.scatter)
 
 
 def settle(model: DropModel, x: Array, matches: Matches | None = None) -> Fit:
@@ -103,33 +112,9 @@ def settle(model: DropModel, x: Array, matches: Matches | None = None) -> Fit:
     return Fit(model, used, x, estimate)
 
 
-class Begun(NamedTuple):
-    """State of a drop's fit at a time scale, to fit it again at another."""
-
-    alpha: float
-    matches: Matches
-    x: Array
-    scatter: float
-
-
-def refit_at_rate(model: DropModel, begun: Begun, rate: float) -> Fit:
-    """Fit a drop again at a slightly different time scale, with the same matches.
-
-    Parameters
-    ----------
-    model
-        Model at the new time scale, with α of `begun`.
-    rate
-        Ratio of the new tick rate to the old.
-    """
-    x, clock = begun.x.copy(), model.unknowns["clock"]
-    x[clock] = (1.0 + x[clock]) * rate - 1.0
-    return alone(DropFit(model, begun.matches, x), begun.scatter)
-
-
-def alone(drop: DropFit, scatter: float = 1.0) -> Fit:
+def alone(drop: DropFit) -> Fit:
     """Fit a drop by itself from its present unknowns, with the same matches."""
-    estimate = adjust(drop.model, drop.matches, drop.x.copy(), done=CLOSE, scatter=scatter)
+    estimate = adjust(drop.model, drop.matches, drop.x.copy(), done=CLOSE)
     return Fit(drop.model, drop.matches, estimate.x, estimate)
 
 

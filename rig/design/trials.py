@@ -79,8 +79,8 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
         identification, wrong = read_drop(protocol_here, fallen, 0.0)
         read += not wrong
         failing.update(wrong)
-        if wrong and not further_gate and identification.fit and identification.other:
-            further_gate = deciding_gate(identification.fit, identification.other)
+        if wrong and not further_gate and identification.drop and identification.other:
+            further_gate = deciding_gate(identification.drop, identification.other)
     return Trials(drops, read, tuple(failing.items()), further_gate)
 
 
@@ -132,9 +132,9 @@ def read_drop(
     """
     identification = identify(protocol, records, CLOCK_U, priors(protocol), earliest)
     unlike = list(pattern_faults(identification))
-    if unlike or identification.fit is None:
+    if unlike or identification.drop is None:
         return identification, unlike or [record.role for record in records]
-    matches = identification.fit.matches
+    matches = identification.drop.matches
     return identification, [
         record.role
         for record in records
@@ -159,7 +159,7 @@ def margin(protocol: Protocol) -> float:
         for off in (-_OFF, _OFF):
             x[model.unknowns["drop"]] = off * protocol.drop.u
             identification, unclear = read_drop(here, perfect(model, x))
-            if identification.fit is None or unclear:
+            if identification.drop is None or unclear:
                 return -math.inf
             least = min(least, identification.log_odds)
     return least
