@@ -25,7 +25,7 @@ from rig.analysis.verdict import is_wrong, judge, judge_record, verdict_of
 from rig.clock.calibration import TimeScale
 from rig.protocol.contact import at_contact
 from rig.protocol.protocol import Protocol, Run
-from rig.reasons import Reason, make_reason
+from rig.reasons import make_reason
 from rig.records import Drop
 from rig.threads import one_thread
 
@@ -207,7 +207,8 @@ class DropCase:
         if verdict == "void" or fit is None:
             if reading.unlike and explain:
                 if reading.explained is None:
-                    reading = replace(reading, explained=self._unlike_fall(reading))
+                    explainer = self._explainer(reading.scale, suspects(records))
+                    reading = replace(reading, explained=explainer.name_fault(None))
                     readings[self.aside] = reading
                 reasons = (*reasons, *(reading.explained or ()))
             return DropResult(run, drop.attempt, verdict, reasons, audit), None
@@ -242,11 +243,6 @@ class DropCase:
             gates=budgets.gates(joint.drops[0]),
         )
         return result, fit
-
-    def _unlike_fall(self, reading: DropIdentity) -> tuple[Reason, ...]:
-        """Return set-up faults that would explain edges that match no fall."""
-        explainer = self._explainer(reading.scale, suspects(self.records))
-        return explainer.name_fault(None)
 
     def _explainer(self, scale: TimeScale, suspects: Suspects) -> Explainer:
         assert self.components is not None
