@@ -1,7 +1,8 @@
 """Faults put into the software, one at a time, and whether any test notices.
 
-A fault is tried on a copy of the project, by the tests that run through its line, the quickest
-first, until one fails. Which those are is known from one run of all rooms' tests.
+A fault is tried on a copy of the project, by the tests that run through its line, until one fails:
+those of its own room before others, and the quickest first. Which run through it is known from one
+run of all rooms' tests.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ KEPT = ROOT / "out" / "mutation"
 _MEMORY_BYTES = 6 << 30
 _PATIENCE = 10.0
 """How many times as long as before tests may take until a fault counts as one that hangs."""
-_MOST_S = 40.0
+_MOST_S = 60.0
 """What the tests of a fault may take together, without it."""
 _START_S = 120.0  # until pytest has loaded everything, on a busy machine
 ROOMS = {
@@ -112,7 +113,7 @@ class Reached:
     lines: dict[str, dict[str, list[int]]]
 
     def tests(self, path: str, line: int) -> list[str]:
-        """List the tests that may notice a fault, the quickest first, until they take too long.
+        """List the tests that may notice a fault, as ranked above, until they take too long.
 
         Where none is known to run through the line (it runs when the file is loaded, or in a
         process that was killed), all that run through the file are, else all there are. Of the
@@ -124,7 +125,11 @@ class Reached:
         whole = set().union(*by_line.values()) or range(len(names))
         span = map(str, _within_a_function(path, line))
         found = set().union(*(by_line.get(at, ()) for at in span)) or whole
-        ranked = sorted((names[n] for n in found), key=lambda one: (self.seconds[one], one))
+        own = f"tests/{path.split('/')[1]}/"
+        ranked = sorted(
+            (names[n] for n in found),
+            key=lambda one: (not one.startswith(own), self.seconds[one], one),
+        )
         spent = accumulate(self.seconds[one] for one in ranked)
         return [one for one, seconds in zip(ranked, spent, strict=True) if seconds <= _MOST_S]
 
