@@ -18,7 +18,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, chain
 from pathlib import Path
 from queue import SimpleQueue
 from statistics import fmean
@@ -126,26 +126,22 @@ class Reached:
         span = map(str, _within_a_function(path, line))
         found = set().union(*(by_line.get(at, ()) for at in span)) or whole
         own = f"tests/{path.split('/')[1]}/"
-        ranked = sorted(
-            (names[n] for n in found),
-            key=lambda one: (not one.startswith(own), self.seconds[one], one),
-        )
+        ranked = sorted((names[n] for n in sorted(found)), key=self.seconds.__getitem__)
+        ranked.sort(key=lambda one: not one.startswith(own))
         spent = accumulate(self.seconds[one] for one in ranked)
         return [one for one, seconds in zip(ranked, spent, strict=True) if seconds <= _MOST_S]
 
 
 def _within_a_function(path: str, line: int) -> range:
     """Lines of the innermost statement of a function that a line is of; none outside of all."""
-    spans, functions = [], []
-    for node in ast.walk(ast.parse((ROOT / path).read_text("utf-8"))):
-        if isinstance(node, ast.stmt):
-            span = range(node.lineno, (node.end_lineno or node.lineno) + 1)
-            spans.append(span)
-            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-                functions.append(span)
-    if not any(line in span for span in functions):
-        return range(0)
-    return min((span for span in spans if line in span), key=len)
+    nodes = [*ast.walk(ast.parse((ROOT / path).read_text("utf-8")))]
+    functions = [one for one in nodes if isinstance(one, ast.FunctionDef | ast.AsyncFunctionDef)]
+    spans = [
+        range(node.lineno, (node.end_lineno or node.lineno) + 1)
+        for node in chain.from_iterable(map(ast.walk, functions))
+        if isinstance(node, ast.stmt)
+    ]
+    return min((span for span in spans if line in span), key=len, default=range(0))
 
 
 def run(arguments: Namespace) -> Iterator[Findings]:

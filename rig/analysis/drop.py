@@ -9,7 +9,6 @@ from functools import cached_property
 
 from rig.analysis.budgets import Budgets
 from rig.analysis.chain_records import ChainRecord, chain_records, thin
-from rig.analysis.components import Components, priors
 from rig.analysis.diagnoses import gates_too_low, silent, suspects
 from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
@@ -84,8 +83,6 @@ class DropCase:
         The raw record.
     scale
         Calibration of its ticks.
-    components
-        Variance components; those of the protocol if not given.
     aside
         Numbers of the gates that are left out, see `rig.analysis.diagnoses.gates_too_low`.
     """
@@ -94,7 +91,6 @@ class DropCase:
     run: Run
     drop: Drop
     scale: TimeScale
-    components: Components | None = None
     aside: tuple[int, ...] = ()
 
     @one_thread
@@ -158,10 +154,8 @@ class DropCase:
         return stated._judge(readings, whole, explain=explain)
 
     def _at_contact(self) -> DropCase:
-        run, protocol = self.run, self.protocol
-        components = self.components or priors(protocol)
-        protocol = at_contact(protocol, run.incline_deg, run.impact)
-        return replace(self, protocol=protocol, components=components)
+        run = self.run
+        return replace(self, protocol=at_contact(self.protocol, run.incline_deg, run.impact))
 
     @cached_property
     def records(self) -> list[ChainRecord]:
@@ -169,15 +163,14 @@ class DropCase:
         return chain_records(self.protocol, self.run, self.drop, self.scale.hz, self.aside)
 
     def _model(self, alpha: float) -> DropModel:
-        return DropModel.of(self.protocol, self.records, self.scale.u, self.components, alpha)
+        return DropModel.of(self.protocol, self.records, self.scale.u, alpha)
 
     def _identify(self, readings: dict[tuple[int, ...], DropIdentity]) -> DropIdentity:
         """Return the identification without the gates `aside`, at a rounded time scale."""
         rough, reading = replace(self, scale=self.scale.coarse()), readings.get(self.aside)
         if reading is None or reading.scale != rough.scale:
-            assert self.components is not None
-            about = self.protocol, rough.records, rough.scale.u, self.components
-            identification = identify(*about, -math.inf if self.drop.fire_tick is None else 0.0)
+            earliest = -math.inf if self.drop.fire_tick is None else 0.0
+            identification = identify(self.protocol, rough.records, rough.scale.u, earliest)
             unlike = pattern_faults(identification, self.protocol.vocabulary)
             drop = None if unlike else identification.drop
             reading = DropIdentity(rough.scale, unlike, drop.begun if drop else None)
@@ -245,9 +238,8 @@ class DropCase:
         return result, fit
 
     def _explainer(self, scale: TimeScale, suspects: Suspects) -> Explainer:
-        assert self.components is not None
         premise = Premise(self.protocol, self.run, scale.hz, self.aside)
-        return Explainer(premise, thin(self.drop, scale.hz), scale.u, self.components, suspects)
+        return Explainer(premise, thin(self.drop, scale.hz), scale.u, suspects)
 
 
 def _blank_audit(drop: Drop, records: Sequence[ChainRecord]) -> Audit:

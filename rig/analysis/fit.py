@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.analysis.adjust import Estimate, adjust
-from rig.analysis.annealing import matched
+from rig.analysis.annealing import PART, matched
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY
 from rig.arrays import Array, Index
@@ -118,12 +118,20 @@ def alone(drop: DropFit) -> Fit:
     return Fit(drop.model, drop.matches, estimate.x, estimate)
 
 
-def match(model: DropModel, x: Array) -> Matches:
-    """Match all edges to rods, given the unknowns."""
+def match(model: DropModel, x: Array, *, late: bool = True) -> Matches:
+    """Match all edges to rods, given the unknowns.
+
+    Parameters
+    ----------
+    late
+        Whether also edges of rods that may have struck before, and are late by that.
+    """
     matches: Matches = {}
     for role, pairing in model.pairings.items():
         heights, speeds = model.trajectory(role, x).heights(pairing.times * model.rate(x))
-        matches[role] = pairing.match(model.all_levels(role, x), heights, speeds, _FINE)
+        sd = np.hypot(_FINE, late * model.components.landed * model.expected[role].landed)
+        sd = np.minimum(sd, model.records[role].pitch / PART)
+        matches[role] = pairing.match(model.all_levels(role, x), heights, speeds, sd)
     return matches
 
 

@@ -28,7 +28,6 @@ from rig.analysis.annealing import (
     log_density,
 )
 from rig.analysis.chain_records import SIDES, ChainRecord
-from rig.analysis.components import Components
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY
 from rig.analysis.fit import Begun, DropFit, Fit, count_matched, settle
@@ -98,7 +97,7 @@ class Identification:
 
     @property
     def reading(self) -> Reading | None:
-        """The best reading, fitted."""
+        """The best reading, fitted; `None` like `drop`."""
         drop = self.drop
         if drop is None:
             return None
@@ -133,7 +132,6 @@ def identify(
     protocol: Protocol,
     records: Sequence[ChainRecord],
     clock_u: float,
-    components: Components,
     earliest: float = -math.inf,
     batches: int | None = None,
 ) -> Identification:
@@ -145,14 +143,12 @@ def identify(
         The chains with their edges.
     clock_u
         Relative standard uncertainty of the time scale.
-    components
-        Variance components.
     earliest
         Earliest possible release, s since the release fired.
     batches
         Greatest number of batches of starts, the likeliest first; all if not given.
     """
-    model = DropModel.of(protocol, records, clock_u, components)
+    model = DropModel.of(protocol, records, clock_u)
     readings = {role: _read(model.side(role), earliest, batches) for role in model.records}
     # Evidence is relative to all edges being strays and every rod missed.
     if all(side and side[0].evidence > 0.0 for side in readings.values()):
@@ -181,19 +177,10 @@ def pattern_faults(
     return reasons
 
 
-def read_quickly(
-    protocol: Protocol, records: Sequence[ChainRecord], clock_u: float, components: Components
-) -> Reading | None:
-    """Return the best reading near the stated values, or `None`; quicker than `identify`."""
-    return identify(protocol, records, clock_u, components, batches=1).reading
-
-
-def most_votes(
-    protocol: Protocol, record: ChainRecord, clock_u: float, components: Components
-) -> int:
+def most_votes(protocol: Protocol, record: ChainRecord, clock_u: float) -> int:
     """Return how many of a side's edges agree on a fall near the stated values, at most."""
     pairing = Pairing.of(record.trains, record.rebound_widths)
-    votes = SideFall.of(protocol, record, pairing, clock_u, components).most_votes()
+    votes = SideFall.of(protocol, record, pairing, clock_u).most_votes()
     return min(votes, possible(record))  # many edges of a flicker vote for the same rod
 
 

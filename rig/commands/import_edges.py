@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 
 from rig.analysis.chain_records import chain_records
-from rig.analysis.components import priors
 from rig.analysis.drop import DropCase
 from rig.analysis.gravity import check_gravity
 from rig.analysis.identify import log_evidence, most_votes
@@ -93,7 +92,7 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
     for n in sorted({*order[:: 1 + len(order) // _MOST], *order[-1:]}):
         run, drop = planned[reading.runs[n]], reading.drop(n)
         records = chain_records(protocol, run, drop, TICK_HZ)
-        votes = sum(most_votes(protocol, record, rate.u, priors(protocol)) for record in records)
+        votes = sum(most_votes(protocol, record, rate.u) for record in records)
         due = sum(record.edge_count for record in records)
         # A single edge is near one of some fall, whenever that began.
         shares.append((votes / max(2, len(drop.edges), due), n))

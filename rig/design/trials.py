@@ -130,7 +130,7 @@ def read_drop(
     earliest
         When chains were let go at the earliest, s.
     """
-    identification = identify(protocol, records, CLOCK_U, priors(protocol), earliest)
+    identification = identify(protocol, records, CLOCK_U, earliest)
     unlike = list(pattern_faults(identification))
     if unlike or identification.drop is None:
         return identification, unlike or [record.role for record in records]
