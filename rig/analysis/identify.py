@@ -28,6 +28,7 @@ from rig.analysis.annealing import (
     log_density,
 )
 from rig.analysis.chain_records import SIDES, ChainRecord
+from rig.analysis.distributions import most_by_chance
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY
 from rig.analysis.fit import Begun, DropFit, Fit, count_matched, settle
@@ -44,8 +45,6 @@ LEAD = math.log(1000.0)
 """Least log odds of a reading against the likeliest different one; below, a drop is ambiguous."""
 _CLEAR = 0.97
 """Matched share of the matchable edges above which no other start is tried."""
-_FAIR = 0.9
-"""Matched share of the matchable edges above which a reading is good."""
 RESTLESS = 2.0
 """Scatter of the edges, relative to the assumed scatter, above which a remark is made."""
 _CLOSE = 30.0
@@ -99,9 +98,9 @@ class Identification:
     def reading(self) -> Reading | None:
         """The best reading, fitted; `None` like `drop`."""
         drop = self.drop
-        if drop is None:
-            return None
-        return weigh(drop if isinstance(drop, Fit) else settle(drop.model, drop.x, drop.matches))
+        if drop is None or isinstance(drop, Fit):
+            return drop and weigh(drop)
+        return weigh(settle(drop.model, drop.x, drop.matches))
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,12 +184,17 @@ def most_votes(protocol: Protocol, record: ChainRecord, clock_u: float) -> int:
 
 
 def well_read(fit: Fit) -> bool:
-    """Whether nearly all matchable edges are matched, with usual scatter and unknowns in range."""
-    matchable = sum(possible(record) for record in fit.model.records.values())
+    """Whether no more edges are missed than may be, with usual scatter and unknowns in range."""
     expected = sum(record.edge_count for record in fit.model.records.values())
-    many = fit.match_count >= max(LEAST * max(1, expected), _FAIR * matchable)
+    whole = expected - fit.match_count <= most_missed(fit.model.protocol, expected)
     strain = float(np.abs(fit.model.unknowns.pull(fit.x)).max())
-    return many and fit.estimate.scatter < RESTLESS and strain < STRAY
+    return whole and fit.estimate.scatter < RESTLESS and strain < STRAY
+
+
+def most_missed(protocol: Protocol, expected: int) -> float:
+    """Return how many of the expected edges a drop may lack, by its limit or by chance."""
+    limit = protocol.accept.missed_edges
+    return max(limit * expected, most_by_chance(expected, min(MISSED, limit / 2.0)))
 
 
 def possible(record: ChainRecord) -> int:
