@@ -162,7 +162,6 @@ def _are_crossed(one: GateCount, other: GateCount) -> bool:
 
 
 def _values(protocol: Protocol, train: EdgeTrain) -> dict[str, Any]:
-    assert protocol.gates is not None
     return gate_values(protocol.gates.gates[train.gate])
 
 
@@ -186,7 +185,6 @@ def gates_too_low(
     tuple of int
         Numbers of the gates in the protocol's list.
     """
-    assert protocol.gates is not None
     counts = gate_counts(records, None if begun is None else begun.matches)
     due, hidden = sum(gate.due for gate in counts), sum(gate.hidden for gate in counts)
     struck, gates = [gate for gate in counts if gate.role == "impact"], protocol.gates.gates

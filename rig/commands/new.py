@@ -38,9 +38,8 @@ def main(arguments: Arguments) -> int:
     text = draft_text(draft)
     protocol = reader.parse(text, str(path))
     check_recordable(protocol, BOARDS.get(board))
-    assert protocol.gates is not None
     texts: dict[str, str | bytes] = {"protocol": text}
-    texts["mounting"] = figure_file(mounting_figure(protocol, protocol.gates), "svg")
+    texts["mounting"] = figure_file(mounting_figure(protocol), "svg")
     if board in BOARDS:
         texts["wiring"] = wiring_drawing(protocol, board)
     with ExitStack() as undo:  # a disk that is full half-way is left as it was

@@ -17,7 +17,6 @@ from rig.analysis.unknowns import SharedUnknowns
 from rig.arrays import Array, Index
 from rig.estimate.hypotheses import model_alpha
 from rig.protocol.contact import at_contact
-from rig.protocol.measurable import check_gates
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Gate, Protocol, Run
 from rig.records import Drop
@@ -77,7 +76,7 @@ class Case:
 
 def with_gates(protocol: Protocol, gates: Iterable[Gate]) -> Protocol:
     """Return a protocol with other gates."""
-    return replace(protocol, gates=replace(check_gates(protocol), gates=tuple(gates)))
+    return replace(protocol, gates=replace(protocol.gates, gates=tuple(gates)))
 
 
 @one_thread

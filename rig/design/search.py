@@ -20,7 +20,6 @@ from rig.design.forecast import GateLayout, forecast
 from rig.design.trials import MARGIN, margin
 from rig.measurands import averaged
 from rig.protocol.gates import blocking_rod, hanging_rods
-from rig.protocol.measurable import check_gates
 from rig.protocol.protocol import Gate, Gates, Protocol
 from rig.threads import one_thread
 
@@ -54,7 +53,7 @@ class Room(NamedTuple):
 
 def room(protocol: Protocol, lowest: float | None, highest: float | None, spacing: float) -> Room:
     """Take limits as they are given, else from the gates that are there and the chains."""
-    heights = [gate.height for gate in check_gates(protocol).gates]
+    heights = [gate.height for gate in protocol.gates.gates]
     top = min(protocol.drop.value + rods.chain.length for rods in protocol.chains.values())
     lowest = min(heights) if lowest is None else lowest
     highest = max(heights) if highest is None else highest
@@ -90,7 +89,7 @@ def better(
     say
         Told how far it is.
     """
-    present, heights = check_gates(protocol), candidates(protocol, limits)
+    present, heights = protocol.gates, candidates(protocol, limits)
     gates = [*present.gates, *(Gate(0, z, side) for side in present.posts for z in heights)]
     inclines = sorted(protocol.plan.inclines)
     few = {inclines[round(n * (len(inclines) - 1) / (FEW - 1))] for n in range(FEW)}
@@ -138,7 +137,7 @@ def _see_before(protocol: Protocol, proposed: Protocol) -> bool:
     With fewer, one missed edge too many leaves the fall open.
     """
     before, after = (
-        Counter(gate.side for gate in check_gates(p).gates if gate.height > protocol.drop.value)
+        Counter(gate.side for gate in p.gates.gates if gate.height > protocol.drop.value)
         for p in (protocol, proposed)
     )
     enough = (after[side] >= min(number, _BEFORE) for side, number in before.items())
