@@ -18,7 +18,7 @@ from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.clock.host import SystemClock
 from rig.commands.output import Arguments, say
 from rig.protocol import reader
-from rig.protocol.measurable import check_measurable, with_gates
+from rig.protocol.measurable import check_measurable, with_channels
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
 from rig.reasons import make_reason, reasons_json
@@ -83,7 +83,7 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
     """Compare the first drops with falls that the protocol has."""
     planned = {run.number: run for run in runs(protocol)}
     # Of gates that the file does not have nothing is due.
-    protocol = with_gates(protocol, {*reading.channel.tolist()})
+    protocol = with_channels(protocol, {*reading.channel.tolist()})
     near, expected, evidence, gravity = 0, 0, 0.0, list[float]()
     shares, results = [(1.0, 0)], list[DropResult]()
     rate = TimeScale(TICK_HZ, RESONATOR_TOLERANCE)

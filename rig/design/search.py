@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.analysis.components import Components
-from rig.design.cases import cases, with_gates
+from rig.design.cases import cases
 from rig.design.forecast import GateLayout, forecast
 from rig.design.trials import MARGIN, margin
 from rig.measurands import averaged
@@ -94,7 +94,7 @@ def better(
     inclines = sorted(protocol.plan.inclines)
     few = {inclines[round(n * (len(inclines) - 1) / (FEW - 1))] for n in range(FEW)}
     fewer = replace(protocol, plan=replace(protocol.plan, inclines=tuple(few)))
-    all_cases = cases(with_gates(fewer, gates), components)
+    all_cases = cases(fewer.with_gates(gates), components)
     layout = list(range(len(present.gates)))
     # Where the layout that is there is itself hard to read, one that is no harder will do.
     floor = min(MARGIN, margin(protocol))
@@ -121,14 +121,14 @@ def better(
                         continue
                     # Only now: whether it can be read takes a few drops to be read.
                     numbers = *layout[:slot], n, *layout[slot + 1 :]
-                    proposed = with_gates(protocol, (gates[number] for number in numbers))
+                    proposed = protocol.with_gates(gates[number] for number in numbers)
                     if _see_before(protocol, proposed) and margin(proposed) >= floor:
                         best, layout[slot] = trial, n
         ratio = math.exp(best - present_score)
         say(f"sweep {sweep}: uncertainties × {ratio:.3g} in the geometric mean")
         if before - best < _WORTH:
             break
-    return with_gates(protocol, _in_order(present, [gates[n] for n in layout]))
+    return protocol.with_gates(_in_order(present, [gates[n] for n in layout]))
 
 
 def _see_before(protocol: Protocol, proposed: Protocol) -> bool:

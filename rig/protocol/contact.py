@@ -108,7 +108,7 @@ def at_contact(protocol: Protocol, incline_deg: float, struck: str | None) -> Pr
         replace(gate, height=gate.height - level.value, stated=gate.height)
         for gate in protocol.gates.gates
     )
-    gates = replace(protocol.gates, gates=tuple(lower))
     drop = Quantity(protocol.drop.value - level.value, protocol.drop.u)
     contact = replace(protocol.contact, level=Quantity(0.0, level.u))
-    return replace(protocol, drop=drop, gates=gates, contact=contact, stated=protocol)
+    lowered = protocol.with_gates(lower)
+    return replace(lowered, drop=drop, contact=contact, stated=protocol)

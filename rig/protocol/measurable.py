@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import replace
 
 from rig.boards import BOARDS, LONGEST_RECORD_MS, Capabilities
 from rig.errors import InputError, Problem
@@ -49,10 +48,9 @@ def record_ms(protocol: Protocol) -> int:
     return max(LEAST_RECORD_MS, math.ceil(wanted_s * 1e3))
 
 
-def with_gates(protocol: Protocol, channels: Collection[int]) -> Protocol:
+def with_channels(protocol: Protocol, channels: Collection[int]) -> Protocol:
     """Return a scene with only the gates at these channels."""
-    gates = tuple(gate for gate in protocol.gates.gates if gate.channel in channels)
-    return replace(protocol, gates=replace(protocol.gates, gates=gates))
+    return protocol.with_gates(gate for gate in protocol.gates.gates if gate.channel in channels)
 
 
 def check_gates(protocol: Protocol) -> None:

@@ -6,7 +6,7 @@ empty, and every later stage leaves it out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import cos, hypot, radians, sin
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -15,7 +15,7 @@ from rig.units import Quantity
 from rig.vocabulary import FENCE, FREE_CHAIN, OBJECT, ONE_CHAIN, TRACK, TWO_CHAINS, Vocabulary
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Iterable
 
     from rig.model.chain import Chain
     from rig.model.surface import Surface
@@ -387,6 +387,10 @@ class Protocol:
         """Chains with separate results as striking chain; for like chains only the first."""
         names = tuple(self.chains)
         return names if self.unlike_chains and self.plan.order != "fixed" else names[:1]
+
+    def with_gates(self, gates: Iterable[Gate]) -> Protocol:
+        """Return the protocol with other gates, whose heights are as uncertain."""
+        return replace(self, gates=replace(self.gates, gates=tuple(gates)))
 
     def condition(self, run: Run) -> Condition:
         """Return the condition of a run, for averages over runs."""
