@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise, product
-from pathlib import Path
 from string import Formatter
 from typing import Any
 
@@ -20,11 +19,11 @@ from rig.protocol.fields import DEFAULTS
 from rig.protocol.keys import SECTIONS, range_of
 from rig.protocol.plan import PATTERNS, runs
 from rig.protocol.protocol import STANDARD_GRAVITY, Protocol, RodChain
+from rig.text_rows import read_paragraphs
 from rig.units import UNITS, Quantity, format_quantity
 
 _EVEN = 1e-9  # m, tolerance for an even spacing
-_BLOCKS = Path(__file__).with_suffix(".txt").read_text("utf-8").strip().split("\n\n")[1:]
-_SECTIONS = {heading: rows for heading, *rows in (block.split("\n") for block in _BLOCKS)}
+_SECTIONS = {heading: rows for heading, *rows in read_paragraphs(__file__)}
 _STATED = [name for name in vars(Protocol) if not name.startswith("_")]
 Facts = Mapping[str, Any]
 
