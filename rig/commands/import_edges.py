@@ -117,8 +117,6 @@ def _check_plan(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:
     planned = len(runs(protocol))
     if run := min((drop.run for drop in drops if drop.run > planned), default=0):
         raise refusal(source, "run_not_planned", run=run, planned=planned)
-    edges = (edge for drop in drops for edge in drop.edges)
-    if idle := sorted(
-        {edge.channel for edge in edges if not protocol.gates.mask >> edge.channel & 1}
-    ):
+    used = {edge.channel for drop in drops for edge in drop.edges}
+    if idle := sorted(used - {gate.channel for gate in protocol.gates.gates}):
         say(make_reason("channels_unused", channels=", ".join(map(str, idle))).text)
