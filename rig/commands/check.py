@@ -17,7 +17,7 @@ def main(arguments: Arguments) -> None:
         print_data(schema(), [page().rstrip()], as_json=arguments.schema)
         return
     protocol = reader.read(arguments.protocol)
-    if arguments.board:
+    if arguments.board and protocol.gates:
         check_recordable(protocol, BOARDS[arguments.board])
     if arguments.output:
         from rig.report import canvas, mounting  # noqa: PLC0415 - matplotlib, only here
