@@ -319,7 +319,6 @@ def chain_records(
     aside
         Numbers of the gates that are left out, in the protocol's list.
     """
-    assert protocol.gates is not None
     edges, shares = EdgeArrays.of(drop.edges, hz), air_shares(protocol)
     sides: tuple[tuple[Side, str | None], ...] = (("impact", run.impact), ("free", run.free))
     records = []

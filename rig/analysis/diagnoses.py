@@ -162,7 +162,6 @@ def _are_crossed(one: GateCount, other: GateCount) -> bool:
 
 
 def _values(protocol: Protocol, train: EdgeTrain) -> dict[str, Any]:
-    assert protocol.gates is not None
     return gate_values(protocol.gates.gates[train.gate])
 
 
@@ -186,7 +185,6 @@ def gates_too_low(
     tuple of int
         Numbers of the gates in the protocol's list.
     """
-    assert protocol.gates is not None
     in_time = None if fit is None else match(fit.model, fit.x, late=False)
     counts = gate_counts(records, in_time)
     due, hidden = sum(gate.due for gate in counts), sum(gate.hidden for gate in counts)

@@ -73,7 +73,6 @@ class DropModel:
         components: Components | None = None,
         alpha: float | None = None,
     ) -> None:
-        assert protocol.gates is not None
         self.protocol = protocol
         self._kappa: float
         self.kappa_u: float
@@ -150,8 +149,6 @@ class DropModel:
         """Return a copy with the priors of a protocol that differs in nothing else."""
         # Heights stay: they may be relative to a contact point of this drop alone.
         current, gates, level = self.protocol, self.protocol.gates, protocol.contact.level
-        assert protocol.gates is not None
-        assert gates is not None
         kappa, kappa_u = prior_air(protocol)
         return self.copy_with(
             components=priors(protocol),

@@ -98,9 +98,9 @@ class Identification:
     def reading(self) -> Reading | None:
         """The best reading, fitted; `None` like `drop`."""
         drop = self.drop
-        if drop is None or isinstance(drop, Fit):
-            return drop and weigh(drop)
-        return weigh(settle(drop.model, drop.x, drop.matches))
+        if drop is None:
+            return None
+        return weigh(drop if isinstance(drop, Fit) else settle(drop.model, drop.x, drop.matches))
 
 
 @dataclass(frozen=True, slots=True)

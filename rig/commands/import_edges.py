@@ -17,7 +17,7 @@ from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.clock.host import SystemClock
 from rig.commands.output import Arguments, say
 from rig.protocol import reader
-from rig.protocol.measurable import check_gates, check_measurable, with_gates
+from rig.protocol.measurable import check_measurable, with_channels
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
 from rig.reasons import make_reason, reasons_json
@@ -40,6 +40,7 @@ of how long they last, so that those that are least like the others are among th
 def main(arguments: Arguments) -> None:
     """Make a session from a file, or say how it would be read."""
     protocol = reader.read(arguments.protocol)
+    check_measurable(protocol)
     source, events = Path(arguments.protocol).name, Path(arguments.events).name
     imported = import_with_protocol(protocol, arguments)
     drops = imported.drops
@@ -71,7 +72,7 @@ def main(arguments: Arguments) -> None:
 
 def import_with_protocol(protocol: Protocol, arguments: Arguments) -> Import:
     """Read the drops of any timer's file as a protocol's falls bear them out."""
-    gates = sorted(check_gates(protocol).gates, key=lambda gate: -gate.height)
+    gates = sorted(protocol.gates.gates, key=lambda gate: -gate.height)
     bars = max(side.chain.rods for side in protocol.chains.values())
     channels = [gate.channel for gate in gates]
     return import_drops(channels, bars, arguments, partial(fit_falls, protocol))
@@ -81,7 +82,7 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
     """Compare the first drops with falls that the protocol has."""
     planned = {run.number: run for run in runs(protocol)}
     # Of gates that the file does not have nothing is due.
-    protocol = with_gates(protocol, {*reading.channel.tolist()})
+    protocol = with_channels(protocol, {*reading.channel.tolist()})
     near, expected, evidence, gravity = 0, 0, 0.0, list[float]()
     shares, results = [(1.0, 0)], list[DropResult]()
     rate = TimeScale(TICK_HZ, RESONATOR_TOLERANCE)
@@ -112,11 +113,9 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
 
 def _check_plan(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:
     """Refuse runs that are not planned; remark on channels that are not gates."""
-    gates = check_gates(protocol)
-    check_measurable(protocol)
     planned = len(runs(protocol))
     if run := min((drop.run for drop in drops if drop.run > planned), default=0):
         raise refusal(source, "run_not_planned", run=run, planned=planned)
-    edges = (edge for drop in drops for edge in drop.edges)
-    if idle := sorted({edge.channel for edge in edges if not gates.mask >> edge.channel & 1}):
+    used = {edge.channel for drop in drops for edge in drop.edges}
+    if idle := sorted(used - {gate.channel for gate in protocol.gates.gates}):
         say(make_reason("channels_unused", channels=", ".join(map(str, idle))).text)

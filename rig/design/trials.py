@@ -86,7 +86,6 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
 
 def _fall(protocol: Protocol, run: Run, rng: np.random.Generator) -> list[ChainRecord]:
     """Let chains fall that hang and are let go a little off, with impulses that scatter."""
-    assert protocol.gates is not None
     model, x = predict_drop(protocol, run, priors(protocol))
     at, sd, fallen = model.unknowns, model.unknowns.sd, []
 

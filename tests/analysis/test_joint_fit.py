@@ -184,7 +184,7 @@ def test_a_drop_that_does_not_go_with_the_others_stays_by_itself():
     pushed = [
         replace(gate, height=gate.height + (-1) ** n * 1.2e-3) for n, gate in enumerate(gates)
     ]
-    other = replace(UNIFORM, gates=replace(UNIFORM.gates, gates=tuple(pushed)))
+    other = UNIFORM.with_gates(pushed)
     rest = cases(FOUR)
     last = replace(case(other, MILD, run=5), protocol=UNIFORM)
     alone = last.analyze()

@@ -21,7 +21,7 @@ def gates_moved(protocol, which, by):
         replace(gate, height=gate.height + by * which(number, gate))
         for number, gate in enumerate(protocol.gates.gates)
     ]
-    return replace(protocol, gates=replace(protocol.gates, gates=tuple(gates)))
+    return protocol.with_gates(gates)
 
 
 def chain_changed(protocol, name, rod, higher, wider):
