@@ -184,9 +184,11 @@ def most_votes(protocol: Protocol, record: ChainRecord, clock_u: float) -> int:
 
 
 def well_read(fit: Fit) -> bool:
-    """Whether no more edges are missed than may be, with usual scatter and unknowns in range."""
+    """Whether nearly all matchable edges are matched, with usual scatter and unknowns in range."""
+    matchable = sum(possible(record) for record in fit.model.records.values())
     expected = sum(record.edge_count for record in fit.model.records.values())
-    whole = expected - fit.match_count <= most_missed(fit.model.protocol, expected)
+    missed = max(matchable, math.ceil(LEAST * expected)) - fit.match_count
+    whole = missed <= most_missed(fit.model.protocol, matchable)
     strain = float(np.abs(fit.model.unknowns.pull(fit.x)).max())
     return whole and fit.estimate.scatter < RESTLESS and strain < STRAY
 
