@@ -83,9 +83,8 @@ def read_all(call, session, out, commands=COMMANDS):
             word.replace("SESSION", str(session)).replace("OUT", str(out / str(number)))
             for word in words
         ]
-        done = call(*given)
         # A doctor's word is of this computer too, and a fence has no impacts to estimate.
-        assert done.code == 0 or words[0] in {"doctor", "estimate"}, (words, done.err)
+        call(*given, code={"doctor": {0, 4}, "estimate": {0, 2}}.get(words[0], 0))
         yield words
     with door.open(session) as opened:
         opened.analyze()

@@ -34,6 +34,7 @@ from rig.reasons import rig_error
 from rig.recorder.controller import Controller
 from rig.recorder.interrupts import Interrupts
 from rig.recorder.published import EDGES_LIMIT, PublishedState
+from tests.refusals import refused
 from tests.tables import cases
 from tests.waiting import PATIENCE_S
 
@@ -119,8 +120,7 @@ def test_who_is_no_daemon_is_told_so(tmp_path, told, why):
         with line:
             line.recv(1 << 10)
             line.sendall(told.encode("latin-1"))
-        with pytest.raises(DeviceError, match=why):
-            client.result()
+        refused(DeviceError, why, client.result)
 
 
 class Time:
@@ -136,10 +136,8 @@ def test_one_client_has_control_until_it_is_not_heard():
     time = Time()
     lease = Lease(time)
     lease.take("one", "rig run 1")
-    with pytest.raises(ControlError, match="rig run 1 has control"):
-        lease.take("two", "tui 2")
-    with pytest.raises(ControlError, match="rig run 1 has it"):
-        lease.require("two")
+    refused(ControlError, "rig run 1 has control", lease.take, "two", "tui 2")
+    refused(ControlError, "rig run 1 has it", lease.require, "two")
     time.now = LEASE_S - 0.1
     lease.heard("two")  # says nothing of the first
     lease.heard("one")
@@ -232,8 +230,7 @@ def test_the_edges_of_an_endless_drop_do_not_fill_the_memory():
 def test_a_replica_does_not_swallow_a_gap():
     replica = Replica()
     replica.follow("snapshot", {"n": 3, "state": {"edges": []}})
-    with pytest.raises(ValueError, match="change 5 behind 3"):
-        replica.follow("change", {"n": 5})
+    refused(ValueError, "change 5 behind 3", replica.follow, "change", {"n": 5})
 
 
 @pytest.mark.parametrize(("worker_comes", "times"), [(False, 5), (True, 1)])

@@ -20,6 +20,7 @@ from rig_emulator.controller import Stop
 from rig_emulator.wiring import BOARDS, firmware_for
 from tests.firmware.emulated import MCUS
 from tests.firmware.toolchain import make
+from tests.refusals import refused
 from tests.tables import cases
 from tests.waiting import PATIENCE_S
 
@@ -187,8 +188,7 @@ def test_a_drop_is_the_truth_to_the_cycle(tmp_path, board):
 
 @cases
 def test_what_is_wrong_in_the_url_is_bad_input(settings, complaint):
-    with pytest.raises(InputError, match=complaint):
-        open_port(url(**settings))
+    refused(InputError, complaint, open_port, url(**settings))
 
 
 @pytest.mark.parametrize("word", rig.boards.BOARDS)
@@ -205,9 +205,8 @@ def test_without_a_build_there_is_the_shipped_firmware(monkeypatch, tmp_path):
     package = tmp_path / "rig"
     (package / "flash").mkdir(parents=True)
     monkeypatch.setattr("rig_emulator.wiring.rig.__file__", str(package / "__init__.py"))
-    with pytest.raises(InputError, match="no firmware for atmega2560") as caught:
-        firmware_for(BOARDS["mega"])
-    assert "make -C firmware" in caught.value.hint
+    error = refused(InputError, "no firmware for atmega2560", firmware_for, BOARDS["mega"])
+    assert "make -C firmware" in error.hint
     shipped = package / "flash" / "atmega2560.hex"
     shipped.touch()
     assert firmware_for(BOARDS["mega"]) == shipped
@@ -232,8 +231,7 @@ def test_the_pty_is_a_board_to_any_program(tmp_path):
         assert device.connect(boot_wait_s=0) == identity
         terminal.stdin.write("reset\n")
         terminal.stdin.flush()
-        with pytest.raises(DeviceError, match="restarted"):
-            device.collect(pack_label(1, 1), timeout=10.0)
+        refused(DeviceError, "restarted", device.collect, pack_label(1, 1), timeout=10.0)
         port.close()
         terminal.stdin.close()
         assert terminal.wait(PATIENCE_S) == 0

@@ -1,13 +1,12 @@
 """Holding a drop, reading it again, acknowledging it, and what a reset leaves."""
 
-import pytest
-
 from rig.errors import DeviceError
 from rig.link import messages as wire
 from rig.link.messages import Phase, RefusalReason
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
 from tests.link.talk import Wire, arm
+from tests.refusals import refused
 
 
 class HoldSuite(Suite):
@@ -65,8 +64,7 @@ class HoldSuite(Suite):
             device.receive()
         bench.reset()
         said = r"restarted about \d+ ms after FIRE: is its supply shared with the magnets\?"
-        with pytest.raises(DeviceError, match=said):
-            device.collect(LABEL)
+        refused(DeviceError, said, device.collect, LABEL)
         (drop,) = device.transcript.unfinished_drops()
         assert drop == device.transcript.pending(LABEL)
         assert "restarted" in {fault.code for fault in drop.faults}

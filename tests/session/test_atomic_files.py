@@ -6,6 +6,7 @@ import pytest
 
 from rig.errors import InputError
 from rig.files import write_atomic
+from tests.refusals import refused
 
 
 def test_replaces_and_leaves_nothing_else(tmp_path: Path) -> None:
@@ -41,15 +42,11 @@ def test_a_failed_write_leaves_the_old_file(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("rig.files.os.fsync", full)
-    with pytest.raises(InputError, match="No space left") as caught:
-        write_atomic(path, "new")
-    assert caught.value.hint
+    assert refused(InputError, "No space left", write_atomic, path, "new").hint
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
 
 
 def test_places_that_cannot_be_written(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="it is a folder"):
-        write_atomic(tmp_path, "x")
-    with pytest.raises(InputError, match="No such file"):
-        write_atomic(tmp_path / "no" / "file", "x")
+    refused(InputError, "it is a folder", write_atomic, tmp_path, "x")
+    refused(InputError, "No such file", write_atomic, tmp_path / "no" / "file", "x")

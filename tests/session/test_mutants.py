@@ -23,6 +23,7 @@ from rig.recover.examine import describe, examine
 from rig.session import foreign
 from rig.session.schema import RunState, read_reasons
 from rig.session.store import Session
+from tests.refusals import refused
 from tests.session.altering import unguarded
 from tests.tables import cases
 
@@ -97,8 +98,7 @@ def test_a_value_of_the_wrong_form_is_refused(sql, what, sound, tmp_path):
     with unguarded(path) as connection:
         connection.execute("PRAGMA ignore_check_constraints = ON")
         connection.execute(sql)
-    with pytest.raises(SessionError, match=what):
-        read_through(path)
+    refused(SessionError, what, read_through, path)
 
 
 def test_what_somebodys_analyze_leaves_is_no_harm(sound, tmp_path):
@@ -112,8 +112,7 @@ def test_what_somebodys_analyze_leaves_is_no_harm(sound, tmp_path):
 def test_a_statement_that_runs_away_is_ended(sound, monkeypatch):
     monkeypatch.setattr(foreign, "_MOST_STEPS", 10)
     monkeypatch.setattr(foreign, "_STEPS", 10)
-    with pytest.raises(SessionError, match="far longer to read than any session"):
-        read_through(sound)
+    refused(SessionError, "far longer to read than any session", read_through, sound)
 
 
 def test_more_edges_than_the_certificate_allows_are_not_read(sound, tmp_path):
@@ -127,8 +126,7 @@ def test_more_edges_than_the_certificate_allows_are_not_read(sound, tmp_path):
             "WITH RECURSIVE n(i) AS (SELECT 1000 UNION ALL SELECT i + 1 FROM n WHERE i < 3000) "
             "INSERT INTO edge SELECT 1, i, i, 0, 1 FROM n;"
         )
-    with pytest.raises(SessionError, match="run 1, attempt 1: it has more than"):
-        read_through(path)
+    refused(SessionError, "run 1, attempt 1: it has more than", read_through, path)
 
 
 HZ = 16_000_000

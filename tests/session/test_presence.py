@@ -17,6 +17,7 @@ from rig.recorder.published import PublishedState
 from rig.recover.examine import examine
 from rig.session.schema import RunState
 from rig.session.store import Session
+from tests.refusals import refused
 from tests.session.failing_disk import FailingDisk
 
 DROPS = ((1, 1), (2, 1))
@@ -67,8 +68,7 @@ def test_nothing_is_armed_and_all_is_saved_beside_it(rig, lose):
     made, protocol, session = rig
     before = made.session.states()
     lose(session)
-    with pytest.raises(SessionError, match=r"everything that was recorded is saved as .*saved-1"):
-        made.arm(2, 1)
+    refused(SessionError, r"everything that was recorded is saved as .*saved-1", made.arm, 2, 1)
     assert made.recorder.armed is None
     saved = session.with_name("session.saved-1")
     with Session.open(saved, readonly=True) as found:
@@ -96,8 +96,7 @@ def test_a_drop_that_fell_meanwhile_is_saved_before_it_is_acknowledged(rig, lose
     made, _, session = rig
     made.fire(made.arm(2, 1))
     lose(session)
-    with pytest.raises(SessionError, match="while it was in use"):
-        made.collect(2, 1)
+    refused(SessionError, "while it was in use", made.collect, 2, 1)
     with Session.open(session.with_name("session.saved-1"), readonly=True) as found:
         assert [(one.run, one.attempt) for one in found.drops()] == [*DROPS]
 
@@ -106,9 +105,8 @@ def test_what_is_not_committed_yet_is_saved_too_and_once(rig):
     made, _, session = rig
     made.session.log_bytes("rx", 7, b"once")
     session.unlink()
-    with pytest.raises(SessionError, match="while it was in use") as caught:
-        made.session.require_presence()
-    assert "but for" not in caught.value.message
+    error = refused(SessionError, "while it was in use", made.session.require_presence)
+    assert "but for" not in error.message
     with Session.open(session.with_name("session.saved-1"), readonly=True) as found:
         assert [chunk.data for chunk in found.byte_log()].count(b"once") == 1
     assert examine(session.with_name("session.saved-1")).rows.chain_faults() == []
@@ -124,8 +122,7 @@ def test_where_its_folder_is_gone_too_all_is_saved_in_the_state_folder(rig, tmp_
     with Session.open(lost / "session") as opened:
         opened.log_bytes("rx", 7, b"once")
         shutil.rmtree(lost)
-        with pytest.raises(SessionError, match=r"state/chainrig/session\.saved-1"):
-            opened.commit()
+        refused(SessionError, r"state/chainrig/session\.saved-1", opened.commit)
         assert opened.rescued
     with Session.open(tmp_path / "state/chainrig/session.saved-1", readonly=True) as found:
         assert found.drop(1, 1) is not None
@@ -135,8 +132,7 @@ def test_where_its_folder_is_gone_too_all_is_saved_in_the_state_folder(rig, tmp_
 def test_a_session_that_was_cut_is_noticed(rig):
     made, _, session = rig
     os.truncate(session, 4096)
-    with pytest.raises(SessionError, match="was cut from"):
-        made.arm(2, 1)
+    refused(SessionError, "was cut from", made.arm, 2, 1)
 
 
 def test_after_an_accepted_run_a_copy_of_the_file_alone_is_whole(rig, tmp_path):
@@ -152,8 +148,7 @@ def test_two_names_of_one_file_are_not_both_written(tmp_path):
     session = make_session(tmp_path)
     (tmp_path / "second").hardlink_to(session)
     for name in (session, tmp_path / "second"):
-        with pytest.raises(SessionError, match="second name"):
-            Session.open(name)
+        refused(SessionError, "second name", Session.open, name)
     with Session.open(session, readonly=True) as found:
         found.check()
 
@@ -174,12 +169,9 @@ def test_a_disk_that_can_only_be_read_any_more_leaves_the_drop_on_the_board(tmp_
         made.collect(1, 1)
         made.fire(made.arm(2, 1))
         disk.fail()
-        with pytest.raises(SessionError, match="the disk failed under"):
-            made.collect(2, 1)
-        with pytest.raises(DeviceError, match="the device still holds the drop of run 2"):
-            made.arm(3, 1)
-        with pytest.raises(SessionError, match="the disk failed under"):
-            made.close()
+        refused(SessionError, "the disk failed under", made.collect, 2, 1)
+        refused(DeviceError, "the device still holds the drop of run 2", made.arm, 3, 1)
+        refused(SessionError, "the disk failed under", made.close)
         with Session.open(session, readonly=True) as found:
             assert [one.run for one in found.drops()] == [1]
 
@@ -192,8 +184,7 @@ def test_a_disk_that_knows_no_locks_is_said_to(tmp_path, monkeypatch):
 
     monkeypatch.setattr(fcntl, "flock", none)
     held = open_files()
-    with pytest.raises(SessionError, match="knows no locks"):
-        Session.open(session)
+    refused(SessionError, "knows no locks", Session.open, session)
     assert open_files() == held
 
 
@@ -201,6 +192,5 @@ def test_a_session_that_another_writes_costs_no_descriptor(tmp_path):
     session = make_session(tmp_path)
     with Session.open(session):
         held = open_files()
-        with pytest.raises(SessionError, match="is being written by process"):
-            Session.open(session)
+        refused(SessionError, "is being written by process", Session.open, session)
         assert open_files() == held
