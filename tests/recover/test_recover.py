@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from rig.cli import main
 from rig.errors import SessionError
 from rig.recover.drops import Fate
 from rig.recover.examine import describe, examine
@@ -67,10 +66,9 @@ def saved(path, folder, **options):
     return content(new), missing
 
 
-def test_a_sound_session_is_whole_and_stays_as_it_is(copy, truth, tmp_path, capsys):
+def test_a_sound_session_is_whole_and_stays_as_it_is(copy, truth, tmp_path, call):
     before = copy.read_bytes()
-    assert main(["recover", str(copy)]) == 0
-    lines = capsys.readouterr().out.splitlines()
+    lines = call("recover", copy).out.splitlines()
     assert lines[-1] == "everything is whole"
     assert sum(line.endswith(str(Fate.CONFIRMED)) for line in lines) == len(truth["drops"])
     assert copy.read_bytes() == before
@@ -276,12 +274,12 @@ def database(path):
         (lambda path: path.write_bytes(b"SQLite format 3\0"), "nothing of a session"),
     ],
 )
-def test_what_is_no_session(make, says, tmp_path, capsys):
+def test_what_is_no_session(make, says, tmp_path, call):
     path = tmp_path / "thing"
     make(path)
-    assert main(["recover", str(path)]) == 2
-    assert f"not a session: {says}" in capsys.readouterr().out or says in str(examine(path).foreign)
-    assert main(["recover", str(path), "-o", str(tmp_path / "new")]) == 2
+    done = call("recover", path, code=2)
+    assert f"not a session: {says}" in done.out or says in str(examine(path).foreign)
+    call("recover", path, "-o", tmp_path / "new", code=2)
     assert not (tmp_path / "new").exists()
 
 
