@@ -1,7 +1,5 @@
 """Rods of unlike thickness in air, beside each rod's fall in closed form."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

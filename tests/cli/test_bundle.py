@@ -1,7 +1,5 @@
 """A session as a bundle: the same bytes twice, and no byte of it altered unseen."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io

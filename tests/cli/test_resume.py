@@ -23,17 +23,7 @@ from rig.replay import replay
 from rig.results.whole import calibration, results
 from rig.session.schema import RunState
 from rig.session.store import Session
-from tests.cli.lab import (
-    ROOT,
-    assert_whole,
-    command,
-    drops_of,
-    log_of,
-    rig,
-    short,
-    short_fence,
-    truth_of,
-)
+from tests.cli import lab
 from tests.waiting import PATIENCE_S, until
 
 
@@ -46,7 +36,7 @@ def protocol(fence):
 def stopped(arguments, session, number, wait_s):
     """Start a campaign, and send it a signal some time after it has begun."""
     process = subprocess.Popen(
-        command(*arguments), cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+        lab.command(*arguments), cwd=lab.ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
         stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     lock = session.with_name(session.name + ".lock")
@@ -93,11 +83,11 @@ def campaign(folder, numbers, longest_s, seed, pace, text):
         with Session.open(session, readonly=True) as opened:
             assert replay(opened).differences == (), f"after {ends}"
         if number != signal.SIGKILL:
-            fallen = {(line["run"], line["attempt"]) for line in truth_of(session)}
+            fallen = {(line["run"], line["attempt"]) for line in lab.truth_of(session)}
             if signal.SIGKILL not in numbers:
-                assert fallen == set(drops_of(session)), "whatever fell is recorded"
-    rig(*arguments)
-    assert_whole(session, 3)
+                assert fallen == set(lab.drops_of(session)), "whatever fell is recorded"
+    lab.rig(*arguments)
+    lab.assert_whole(session, 3)
     return session, ends
 
 
@@ -105,7 +95,7 @@ def campaign(folder, numbers, longest_s, seed, pace, text):
 def test_signals_at_random_moments_of_a_real_time_campaign_cost_no_run(tmp_path):
     int_, term, kill = signal.SIGINT, signal.SIGTERM, signal.SIGKILL
     cases = [(int_, term), (kill, kill), (term, kill, int_)]
-    text = short("40 deg", 3, "0.2 s")
+    text = lab.short("40 deg", 3, "0.2 s")
     with ThreadPoolExecutor(len(cases)) as pool:
         made = list(
             pool.map(
@@ -120,7 +110,7 @@ def test_signals_at_random_moments_of_a_real_time_campaign_cost_no_run(tmp_path)
             found = results(opened).json()
         assert abs(clock["error_ppm"] + 1300.0) < 5.0 * clock["u_ppm"], ends
         assert clock["u_ppm"] < 200.0
-        truth = {(line["run"], line["attempt"]): line for line in truth_of(session)}
+        truth = {(line["run"], line["attempt"]): line for line in lab.truth_of(session)}
         for run in found["runs"]:
             true = truth[run["run"], run["attempt"]]
             for name in ("separation_m", "speed_m_s", "release_skew_s"):
@@ -129,7 +119,7 @@ def test_signals_at_random_moments_of_a_real_time_campaign_cost_no_run(tmp_path)
 
 def test_signals_at_random_moments_of_a_fast_campaign_cost_no_run(tmp_path):
     """In virtual time nearly every moment is one of work, not of waiting."""
-    cases, text = [(signal.SIGTERM,), (signal.SIGKILL,)], short_fence(3)
+    cases, text = [(signal.SIGTERM,), (signal.SIGKILL,)], lab.short_fence(3)
     with ThreadPoolExecutor(2) as pool:
         made = pool.map(
             lambda case: campaign(tmp_path, case[1], 0.25, case[0], 0, text), enumerate(cases)
@@ -164,7 +154,7 @@ def test_a_signal_between_a_byte_and_what_it_means_waits(run, tmp_path, monkeypa
     with Session.open(tmp_path / "s", readonly=True) as session:
         assert replay(session).differences == ()
     run()
-    assert_whole(tmp_path / "s", 2)
+    lab.assert_whole(tmp_path / "s", 2)
 
 
 @pytest.mark.parametrize(
@@ -186,12 +176,12 @@ def test_whoever_stops_before_the_release_sees_nothing_fall(
         monkeypatch.setattr(Worker, name, lambda *a, ask=ask, **k: (ask(*a, **k), asked.set())[0])
     monkeypatch.setattr(Session, "add_state", add)
     run(code=130)
-    assert truth_of(tmp_path / "s") == []
+    assert lab.truth_of(tmp_path / "s") == []
     monkeypatch.undo()
     run()
-    assert_whole(tmp_path / "s", 2)
-    assert (1, RunState.INTERRUPTED) in log_of(tmp_path / "s")[1]
-    assert (1, 1) not in drops_of(tmp_path / "s")
+    lab.assert_whole(tmp_path / "s", 2)
+    assert (1, RunState.INTERRUPTED) in lab.log_of(tmp_path / "s")[1]
+    assert (1, 1) not in lab.drops_of(tmp_path / "s")
 
 
 @pytest.mark.parametrize("state", [RunState.RECORDED, RunState.ACCEPTED])
@@ -208,10 +198,10 @@ def test_a_drop_that_is_recorded_when_the_signal_comes_is_not_made_again(
     monkeypatch.setattr(Session, "add_state", add)
     run(code=130)
     monkeypatch.undo()
-    assert drops_of(tmp_path / "s") == [(1, 1)]
+    assert lab.drops_of(tmp_path / "s") == [(1, 1)]
     run()
-    assert drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
-    assert_whole(tmp_path / "s", 2)
+    assert lab.drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
+    lab.assert_whole(tmp_path / "s", 2)
 
 
 # ------------------------------------------------- what keeps the signals waiting
@@ -327,21 +317,21 @@ def cut_off_in_the_fall(run, monkeypatch, state=RunState.FIRED):
 @pytest.mark.parametrize("state", [RunState.FIRED, RunState.RECORDED])
 def test_a_drop_that_the_board_still_holds_is_fetched(run, tmp_path, monkeypatch, one_board, state):
     cut_off_in_the_fall(run, monkeypatch, state)
-    assert log_of(tmp_path / "s")[1][-1] == (1, state)
+    assert lab.log_of(tmp_path / "s")[1][-1] == (1, state)
     one_board(2.0)  # the recording ends
     assert "fetching run 1, attempt 1, from the device" in run().err
-    assert drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
-    assert len(truth_of(tmp_path / "s")) == 2
-    assert_whole(tmp_path / "s", 2)
+    assert lab.drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
+    assert len(lab.truth_of(tmp_path / "s")) == 2
+    lab.assert_whole(tmp_path / "s", 2)
 
 
 @pytest.mark.parametrize("one_board", ["board restarts"], indirect=True)
 def test_a_drop_that_a_restart_cut_short_is_made_again(run, tmp_path, monkeypatch, one_board):
     cut_off_in_the_fall(run, monkeypatch)
     assert "fetching" not in run().err
-    assert log_of(tmp_path / "s")[1][2:4] == [(1, RunState.INTERRUPTED), (2, RunState.ARMED)]
-    assert drops_of(tmp_path / "s") == [(1, 2), (2, 1)]
-    assert_whole(tmp_path / "s", 2)
+    assert lab.log_of(tmp_path / "s")[1][2:4] == [(1, RunState.INTERRUPTED), (2, RunState.ARMED)]
+    assert lab.drops_of(tmp_path / "s") == [(1, 2), (2, 1)]
+    lab.assert_whole(tmp_path / "s", 2)
 
 
 @pytest.mark.parametrize("one_board", ["board restarts"], indirect=True)
@@ -356,10 +346,10 @@ def test_a_drop_of_another_session_is_neither_taken_nor_discarded(
     cut_off_in_the_fall(run, monkeypatch)
     one_board(2.0)
     for name in ("newer", "older"):
-        before = drops_of(tmp_path / name) if name == "older" else []
+        before = lab.drops_of(tmp_path / name) if name == "older" else []
         done = other(name, code=4)
         assert "session" in done.err
         assert "taking the power from the board discards the drop" in done.err
-        assert drops_of(tmp_path / name) == before
+        assert lab.drops_of(tmp_path / name) == before
     assert "fetching run 1, attempt 1" in run().err
-    assert_whole(tmp_path / "s", 2)
+    lab.assert_whole(tmp_path / "s", 2)

@@ -1,7 +1,5 @@
 """Frames, messages and a drop put together of them: all that is said comes out again."""
 
-from __future__ import annotations
-
 import zlib
 from dataclasses import fields
 

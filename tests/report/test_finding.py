@@ -1,7 +1,5 @@
 """What a session found, in sentences; how it departed from its plan; what each gate saw."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from types import SimpleNamespace

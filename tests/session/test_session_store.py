@@ -1,7 +1,5 @@
 """The session keeps what it is given, in order, and lets nobody alter it unnoticed."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import sqlite3
