@@ -13,7 +13,7 @@ from rig.protocol import contact, reader
 from rig.protocol.describe import describe
 from rig.reasons import sentences
 from sim.dials import Dials
-from tests.analysis.drops import GRADED, UNIFORM, case
+from tests.analysis.drops import GRADED, UNIFORM, assert_true, case
 
 
 def raised(text: str, by_mm: float) -> str:
@@ -91,9 +91,7 @@ def test_drops_at_several_inclines_are_fitted_together():
     truths = sorted((one.truth for one in drops), key=lambda one: (one.attempt, one.run))
     results.sort(key=lambda one: (one.attempt, one.run.number))
     for result, truth in zip(results, truths, strict=True):
-        for name in ("separation_m", "speed_m_s", "release_skew_s"):
-            measured = result.quantities[name]
-            assert abs(measured.value - getattr(truth, name)) < 3.0 * measured.u
+        assert_true(result, truth, 1.5, ("separation_m", "speed_m_s", "release_skew_s"))
 
 
 def test_gates_are_named_by_the_heights_of_the_file():

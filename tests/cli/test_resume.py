@@ -9,6 +9,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import count
+from unittest.mock import Mock
 
 import pytest
 
@@ -306,11 +307,9 @@ def cut_off_in_the_fall(run, monkeypatch, state=RunState.FIRED):
     """Lose the connection just before the drop is read, or just before it is acknowledged."""
     fail = {RunState.FIRED: "collect", RunState.RECORDED: "acknowledge"}[state]
 
-    def broken(device, *_):
-        raise DeviceError("connection lost: somebody stumbled")
-
+    lost = DeviceError("connection lost: somebody stumbled")
     with monkeypatch.context() as patch:
-        patch.setattr(Device, fail, broken)
+        patch.setattr(Device, fail, Mock(side_effect=lost))
         run(code=4)
 
 

@@ -2,7 +2,6 @@
 
 import json
 import os
-import pty
 import random
 import re
 from dataclasses import replace
@@ -19,14 +18,13 @@ from rig.doctor.computer import PORT_CHECKS, check_packages, check_room
 from rig.doctor.session import check_restarts, check_session, describe_supply
 from rig.errors import DeviceError
 from rig.link import messages as wire
-from rig.link.messages import RefusalReason
 from rig.link.transcript import Restart
 from rig.records import Certificate, Drop
 from rig.selftest.board import BoardUnderTest, SelftestOptions
 from rig.selftest.findings import Verdict, make_check
 from rig.selftest.run import run_checks
 from rig.session.store import Session
-from tests.flash.pty_board import PtyBoard
+from tests.flash.pty_board import PtyBoard, silent_port
 from tests.selftest.benches import LoopedBoard, Wire, fire_drop, hold_drop, port_of
 from tests.selftest.broken import claims, odd
 from tests.session.altering import unguarded
@@ -106,7 +104,9 @@ def test_what_is_wrong_is_said_with_what_to_do(make, check, says, advises):
     assert not re.search(r"[{}]", str(finding))
 
 
-@pytest.mark.parametrize("reason", [RefusalReason.GATE_BLOCKED, RefusalReason.GATE_UNSTEADY])
+@pytest.mark.parametrize(
+    "reason", [wire.RefusalReason.GATE_BLOCKED, wire.RefusalReason.GATE_UNSTEADY]
+)
 @pytest.mark.parametrize("times", [3, 100])
 def test_a_gate_that_forbids_firing_now_and_then_is_tried_again(reason, times, monkeypatch):
     refusals = iter([wire.Refused(reason, 4)] * times)
@@ -168,10 +168,8 @@ def test_restarts_that_only_certificates_tell_of_and_a_supply_that_sinks():
 
 @pytest.fixture
 def terminal():
-    ends = pty.openpty()
-    yield os.ttyname(ends[1])
-    for end in ends:
-        os.close(end)
+    with silent_port() as path:
+        yield path
 
 
 @pytest.fixture

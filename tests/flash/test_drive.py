@@ -16,7 +16,6 @@ from rig.flash import steps
 from rig.flash.boards import DRIVE, TARGETS
 from rig.flash.image import read_image, shipped_firmware
 from rig.link import messages as wire
-from rig.link.messages import RefusalReason
 from rig.reasons import rig_error
 from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
@@ -104,9 +103,9 @@ def test_a_running_pico_is_asked_to_take_firmware(flash, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("reason", "message"),
     [
-        (RefusalReason.HOLDING_A_DROP, "the device still holds the drop of run 7"),
-        (RefusalReason.BUSY, "the device is busy with a drop"),
-        (RefusalReason.UNKNOWN_MESSAGE, "hold its BOOTSEL button"),
+        (wire.RefusalReason.HOLDING_A_DROP, "the device still holds the drop of run 7"),
+        (wire.RefusalReason.BUSY, "the device is busy with a drop"),
+        (wire.RefusalReason.UNKNOWN_MESSAGE, "hold its BOOTSEL button"),
     ],
 )
 def test_a_running_pico_that_refuses_is_left_alone(flash, tmp_path, monkeypatch, reason, message):

@@ -1,9 +1,5 @@
 """rig flash with an avrdude that flashes nothing, and which files may be flashed on which board."""
 
-import os
-import pty
-from contextlib import contextmanager
-
 import pytest
 import serial
 
@@ -11,24 +7,13 @@ from rig import boards
 from rig.errors import InputError
 from rig.flash.boards import TARGETS
 from rig.flash.image import read_image
-from tests.flash.pty_board import PtyBoard
+from tests.flash.pty_board import PtyBoard, silent_port
 from tests.tables import cases
 
 VERSION = read_image(TARGETS["mega"].image_path, TARGETS["mega"]).firmware
 NAMES = {"board": "Arduino Mega 2560", "firmware": VERSION}
 PTY = "where nobody answers"
 OTHER = "is for an Arduino Uno, not for an Arduino Mega 2560"
-
-
-@contextmanager
-def silent_port():
-    """Open a port behind which nobody answers."""
-    ends = pty.openpty()
-    try:
-        yield os.ttyname(ends[1])
-    finally:
-        for end in ends:
-            os.close(end)
 
 
 def options(argv):

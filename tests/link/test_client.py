@@ -1,6 +1,5 @@
 """What client and port do when a device, a line or an address misbehaves."""
 
-import os
 import socket
 import sys
 from dataclasses import replace
@@ -24,10 +23,10 @@ from rig.reasons import make_reason
 from rig.records import ClockSample
 from sim.clock import VirtualClock
 from tests.daemon.far_port import FarPort
-from tests.flash.pty_board import PtyBoard
+from tests.flash.pty_board import PtyBoard, silent_port
 from tests.link.bench import LABEL, ScriptedLab, falling_rods
 from tests.link.strategies import MESSAGES
-from tests.link.talk import arm
+from tests.link.talk import arm, connected
 from tests.refusals import refused
 from tests.tables import cases
 from tests.waiting import until
@@ -442,14 +441,10 @@ def test_a_real_port_has_the_computer_s_clock():
 
 
 def test_a_port_belongs_to_one_program():
-    controller, line = os.openpty()
-    try:
-        first = open_port(os.ttyname(line))
-        refused(DeviceError, "another program uses it", open_port, os.ttyname(line))
+    with silent_port() as path:
+        first = open_port(path)
+        refused(DeviceError, "another program uses it", open_port, path)
         first.close()
-    finally:
-        os.close(controller)
-        os.close(line)
 
 
 @cases
@@ -464,16 +459,9 @@ def bridge():
         yield bridge
 
 
-def connected(url, tap=lambda *_: None):
-    port = open_port(url)
-    device = Device(port, port_clock(port), tap)
-    device.connect(boot_wait_s=0.5)
-    return port, device
-
-
 def test_a_drop_comes_whole_over_tcp_and_outlives_a_reconnect(bridge):
     chunks = []
-    port, device = connected(bridge.url, lambda *chunk: chunks.append(chunk))
+    port, device = connected(bridge.url, lambda *chunk: chunks.append(chunk), boot_wait_s=0.5)
     device.fire(arm(device))
     drop = device.collect(LABEL)
     port.close()
@@ -481,13 +469,13 @@ def test_a_drop_comes_whole_over_tcp_and_outlives_a_reconnect(bridge):
     assert len(drop.edges) == len(falling_rods())
     received = [data for direction, _, data in chunks if direction == "rx"]
     assert sum(map(len, received)) / len(received) > 8  # not byte by byte
-    port, again = connected(bridge.url)
+    port, again = connected(bridge.url, boot_wait_s=0.5)
     assert again.fetch(LABEL) == drop
     port.close()
 
 
 def test_a_connection_that_ends_is_said(bridge):
-    port, device = connected(bridge.url)
+    port, device = connected(bridge.url, boot_wait_s=0.5)
     bridge.hang_up()
     refused(DeviceError, r"the port is gone|reset by peer|Broken pipe", device.status)
     port.close()

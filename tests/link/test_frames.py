@@ -19,7 +19,6 @@ from rig.link.frames import (
     cobs_decode,
     encode,
 )
-from rig.link.messages import Event, pack_events
 from rig.link.refusals import DeviceRefusedError
 from tests.examples import examples
 from tests.link.strategies import LONG, MESSAGES
@@ -201,7 +200,7 @@ def test_the_wire_has_room_for_what_the_table_of_boards_allows():
 
 
 STATES = st.integers(0, 2**16 - 1) | st.integers(0, 3)
-EVENT_LISTS = st.lists(st.builds(Event, LONG, STATES), max_size=12)
+EVENT_LISTS = st.lists(st.builds(wire.Event, LONG, STATES), max_size=12)
 
 
 def edges_one_by_one(known, certificate, fire_tick):
@@ -226,7 +225,7 @@ def test_a_drop_is_put_together_as_from_single_events(data):
     assert not drop.begun
     for _ in range(data.draw(st.integers(0, 5))):
         first, events = data.draw(st.integers(0, 30)), data.draw(EVENT_LISTS)
-        drop.add(wire.EventsFrame(drop.label, first, pack_events(events)))
+        drop.add(wire.EventsFrame(drop.label, first, wire.pack_events(events)))
         known |= dict(enumerate(events, first))
     assert drop.begun == bool(known)
     if data.draw(st.booleans()):
@@ -235,7 +234,7 @@ def test_a_drop_is_put_together_as_from_single_events(data):
         known = dict(sorted(known.items())[:-latest])
     assert drop.missing() == []
     total, fire_tick = data.draw(st.integers(0, 40)), data.draw(LONG)
-    crc = zlib.crc32(pack_events([e for number, e in sorted(known.items()) if number < total]))
+    crc = zlib.crc32(wire.pack_events([e for number, e in sorted(known.items()) if number < total]))
     crc ^= data.draw(st.integers(0, 1))
     gates, initial = data.draw(STATES), data.draw(STATES)
     drop.certificate = wire.DropCertificate(
@@ -244,7 +243,9 @@ def test_a_drop_is_put_together_as_from_single_events(data):
     first = data.draw(st.integers(0, 10))
     assert drop.missing(first) == [n for n in range(first, total) if n not in known]
     whole = set(range(total)) <= set(known)
-    right = crc == zlib.crc32(pack_events([known[n] for n in range(total)])) if whole else False
+    right = (
+        crc == zlib.crc32(wire.pack_events([known[n] for n in range(total)])) if whole else False
+    )
     assert drop.sound() == right
     made = drop.drop(16_000_000)
     assert made.edges == edges_one_by_one(known, drop.certificate, fire_tick)

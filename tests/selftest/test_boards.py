@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from functools import partial
+from unittest.mock import Mock
 
 import pytest
 
@@ -10,7 +11,6 @@ from rig.errors import DeviceError
 from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.frames import Frame, encode
-from rig.link.messages import Phase, RefusalReason
 from rig.selftest.board import SelftestOptions
 from rig.selftest.checks import BAD_ORDERS
 from rig.selftest.findings import Verdict
@@ -154,7 +154,7 @@ def test_a_drop_that_an_earlier_test_left_is_cleared_away():
     port = port_of(LoopedBoard(Wire()))
     device, *_ = hold_drop(port, wire.TEST_RUN)
     assert failed(outcomes(port)) == []
-    assert device.status().phase is Phase.IDLE
+    assert device.status().phase is wire.Phase.IDLE
 
 
 ONLY_HANDS = {"GATE_UNSTEADY", "STOPPED", "NOT_KEPT"}
@@ -189,7 +189,7 @@ def test_each_bad_order_that_is_accepted_is_found_out(name, value, monkeypatch):
             # Only the very variant: another bad order may share its one value.
             usual = order.pulse_us in {0, 50_000} or name == "pulse_us"
             lax = getattr(order, name) == value and usual and order.release
-            if answer == wire.Refused(RefusalReason.BAD_PARAMETER, 0) and (
+            if answer == wire.Refused(wire.RefusalReason.BAD_PARAMETER, 0) and (
                 lax or name == "release"
             ):
                 return wire.Armed(1) if getattr(order, name) == value else answer
@@ -255,10 +255,7 @@ def test_a_cable_that_is_pulled_is_said(monkeypatch):
     tests = selftest(port, SelftestOptions())
     next(tests)
 
-    def gone(*_):
-        raise OSError("device disconnected")
-
-    monkeypatch.setattr(port, "read", gone)
+    monkeypatch.setattr(port, "read", Mock(side_effect=OSError("device disconnected")))
     assert {finding.what for finding in tests if finding.failed} == {
         "connection lost: device disconnected"
     }

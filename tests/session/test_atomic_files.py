@@ -1,6 +1,7 @@
 """Atomic writes: the old file or the new one."""
 
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -38,9 +39,7 @@ def test_a_failed_write_leaves_the_old_file(
     path = tmp_path / "report.html"
     path.write_text("old")
 
-    def full(_handle: int) -> None:
-        raise OSError(28, "No space left on device")
-
+    full = Mock(side_effect=OSError(28, "No space left on device"))
     monkeypatch.setattr("rig.files.os.fsync", full)
     assert refused(InputError, "No space left", write_atomic, path, "new").hint
     assert path.read_text() == "old"

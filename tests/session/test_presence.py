@@ -6,19 +6,20 @@ import fcntl
 import os
 import shutil
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from bench.mutants import make_session
 from bench.process_fixture import FENCE
-from rig.errors import DeviceError, InputError, SessionError
+from rig.errors import DeviceError, SessionError
 from rig.recorder.controller import Controller
 from rig.recorder.published import PublishedState
 from rig.recover.examine import examine
 from rig.session.schema import RunState
 from rig.session.store import Session
+from tests.programs import run_program
 from tests.refusals import refused
-from tests.session.failing_disk import FailingDisk
 
 DROPS = ((1, 1), (2, 1))
 
@@ -153,36 +154,47 @@ def test_two_names_of_one_file_are_not_both_written(tmp_path):
         found.check()
 
 
-def test_a_disk_that_can_only_be_read_any_more_leaves_the_drop_on_the_board(tmp_path):
+@pytest.fixture
+def disk(tmp_path):
+    """Mount a small ext4 of a file; give its folder, and the file by which the kernel fails it."""
+    folder, image = tmp_path / "mounted", tmp_path / "ext4"
+    folder.mkdir()
+    with image.open("wb") as file:
+        file.truncate(16 << 20)
     try:
-        disk = FailingDisk(tmp_path)
-    except InputError as error:
-        pytest.skip(error.message)
-    with disk:
-        if not disk.can_fail:
-            pytest.skip("no /sys/fs/ext4 here: a disk cannot be made to fail")
-        protocol, session = disk.folder / "fence.yaml", disk.folder / "session"
-        protocol.write_text(FENCE.replace("RUNS", "3"), "utf-8")
-        made = Controller("sim://", PublishedState())
-        made.open_session(str(protocol), str(session), 3)
-        made.fire(made.arm(1, 1))
-        made.collect(1, 1)
-        made.fire(made.arm(2, 1))
-        disk.fail()
-        refused(SessionError, "the disk failed under", made.collect, 2, 1)
-        refused(DeviceError, "the device still holds the drop of run 2", made.arm, 3, 1)
-        refused(SessionError, "the disk failed under", made.close)
-        with Session.open(session, readonly=True) as found:
-            assert [one.run for one in found.drops()] == [1]
+        run_program("mkfs.ext4", "-q", image)
+        run_program("mount", "-o", "loop,errors=remount-ro", image, folder)
+    except (OSError, AssertionError) as error:  # it takes root and a kernel that knows loop devices
+        pytest.skip(f"no disk can be mounted here: {error}")
+    source = Path(run_program("findmnt", "-no", "SOURCE", folder).stdout.strip())
+    yield folder, Path("/sys/fs/ext4", source.name, "trigger_fs_error")
+    run_program("umount", "--lazy", folder)
+
+
+def test_a_disk_that_can_only_be_read_any_more_leaves_the_drop_on_the_board(disk):
+    folder, trigger = disk
+    if not os.access(trigger, os.W_OK):
+        pytest.skip("no /sys/fs/ext4 here: a disk cannot be made to fail")
+    protocol, session = folder / "fence.yaml", folder / "session"
+    protocol.write_text(FENCE.replace("RUNS", "3"), "utf-8")
+    made = Controller("sim://", PublishedState())
+    made.open_session(str(protocol), str(session), 3)
+    made.fire(made.arm(1, 1))
+    made.collect(1, 1)
+    made.fire(made.arm(2, 1))
+    trigger.write_text("1", "ascii")
+    refused(SessionError, "the disk failed under", made.collect, 2, 1)
+    refused(DeviceError, "the device still holds the drop of run 2", made.arm, 3, 1)
+    refused(SessionError, "the disk failed under", made.close)
+    with Session.open(session, readonly=True) as found:
+        assert [one.run for one in found.drops()] == [1]
 
 
 def test_a_disk_that_knows_no_locks_is_said_to(tmp_path, monkeypatch):
     session = make_session(tmp_path)
 
-    def none(*_):
-        raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
-
-    monkeypatch.setattr(fcntl, "flock", none)
+    none = OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
+    monkeypatch.setattr(fcntl, "flock", Mock(side_effect=none))
     held = open_files()
     refused(SessionError, "knows no locks", Session.open, session)
     assert open_files() == held

@@ -6,6 +6,7 @@ import re
 import runpy
 import shutil
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 from serial.tools.list_ports_common import ListPortInfo
@@ -45,10 +46,7 @@ def plugged(monkeypatch):
 
 @pytest.fixture
 def never(monkeypatch):
-    def fail(url):
-        raise AssertionError(f"{url} was opened")
-
-    monkeypatch.setattr("rig.commands.ports.open_port", fail)
+    monkeypatch.setattr("rig.commands.ports.open_port", Mock(side_effect=AssertionError))
 
 
 def test_candidates_come_first_and_the_others_say_why_not(plugged, never, call):
@@ -89,16 +87,11 @@ def test_nothing_there_is_said(plugged, never, call):
 
 
 def test_only_candidates_are_asked_who_they_are(plugged, monkeypatch, call):
-    opened = []
-
-    def refuse(url):
-        opened.append(url)
-        raise DeviceError(f"cannot open {url}: busy", "close it")
-
-    monkeypatch.setattr("rig.commands.ports.open_port", refuse)
-    assert "cannot open /dev/ttyACM3: busy" in call("ports", "--identify").out
+    busy = Mock(side_effect=DeviceError("it is busy", "close it"))
+    monkeypatch.setattr("rig.commands.ports.open_port", busy)
+    assert "it is busy" in call("ports", "--identify").out
     call("ports", "--identify", "/dev/ttyUSB0")
-    assert opened == ["/dev/ttyACM3", "/dev/ttyUSB0"]
+    assert [asked.args[0] for asked in busy.call_args_list] == ["/dev/ttyACM3", "/dev/ttyUSB0"]
 
 
 def test_who_is_there_is_said_and_that_boards_share_an_id(plugged, call):
