@@ -146,13 +146,7 @@ def half_the_speed(one: Case) -> list[Edge]:
     return [edge._replace(tick=2 * edge.tick) for edge in one.drop.edges]
 
 
-WRONG = [
-    upside_down,
-    backwards,
-    shuffled_channels,
-    gates_the_other_way_up,
-    half_the_speed,
-]
+WRONG = [upside_down, backwards, shuffled_channels, gates_the_other_way_up, half_the_speed]
 
 
 @pytest.mark.parametrize("change", WRONG)
@@ -309,9 +303,7 @@ def test_air_that_pushes_is_told_of_beyond_its_own_uncertainty(share, pushed):
     u = 0.5 * 4.0  # of the unknown in its own units, and one of these
     fit = SimpleNamespace(
         model=SimpleNamespace(
-            protocol=UNIFORM,
-            unknowns={"drag": slice(0, 1)},
-            kappa=lambda _x: -share * _SURE * u,
+            protocol=UNIFORM, unknowns={"drag": slice(0, 1)}, kappa=lambda _x: -share * _SURE * u
         ),
         estimate=SimpleNamespace(x=[0.0], inverse=np.array([[0.5]]), sd=[4.0], scatter=1.0),
     )

@@ -194,8 +194,7 @@ def verdicts(port):
 
 
 @pytest.mark.parametrize(
-    ("words", "advises"),
-    [(b"screen", "close that program"), (b"rig daemon", "let that daemon")],
+    ("words", "advises"), [(b"screen", "close that program"), (b"rig daemon", "let that daemon")]
 )
 def test_who_has_a_port_open(words, advises, terminal, process):
     process(7, [b"sleep"], "/dev/null")

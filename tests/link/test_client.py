@@ -271,9 +271,8 @@ def test_a_device_that_refuses_even_what_it_says_it_keeps_is_not_asked_for_ever(
         def refusal(self):
             return wire.Refused(wire.RefusalReason.NOT_KEPT, 0)
 
-    with pytest.raises(DeviceRefusedError) as caught:
-        Device(Denier(clock, {}), clock).fetch(1)
-    assert caught.value.reason is wire.RefusalReason.NOT_KEPT
+    error = refused(DeviceRefusedError, "", Device(Denier(clock, {}), clock).fetch, 1)
+    assert error.reason is wire.RefusalReason.NOT_KEPT
 
 
 def test_what_a_streaming_device_no_longer_keeps_is_not_forgotten_by_the_host(clock):

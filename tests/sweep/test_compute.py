@@ -137,11 +137,10 @@ def test_units_lead_to_si_and_degrees():
 
 @cases
 def test_a_fault_is_told_at_its_column(text, column, said):
-    with pytest.raises(InputError) as caught:
-        read_vary([text], NAMES)
-    assert caught.value.exit_code == 2
-    assert f", column {column}: " in caught.value.message
-    assert said in caught.value.message
+    error = refused(InputError, "", read_vary, [text], NAMES)
+    assert error.exit_code == 2
+    assert f", column {column}: " in error.message
+    assert said in error.message
 
 
 def test_all_faults_are_told_at_once():
