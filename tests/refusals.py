@@ -9,8 +9,8 @@ Error = TypeVar("Error", bound=BaseException)
 
 
 def refused(kind: type[Error], words: str, work: Callable, *arguments: object, **options) -> Error:
-    """See that work ends with an error of this kind, in words as `re.search` finds them."""
+    """See that work ends with such an error, in words as `re.search` finds them or, "", in any."""
     __tracebackhide__ = True
-    with pytest.raises(kind, match=words) as caught:
+    with pytest.raises(kind, match=words or None) as caught:
         work(*arguments, **options)
     return caught.value

@@ -32,8 +32,8 @@ def armed(driver):
     """Arm as soon as the release has rested three times as long as it was on."""
     try:
         return driver.arm(1, 1)
-    except DeviceRefusedError as refused:
-        if refused.reason is not RefusalReason.COOLING:
+    except DeviceRefusedError as error:
+        if error.reason is not RefusalReason.COOLING:
             raise
         return 0
 

@@ -19,6 +19,7 @@ from rig.link import messages as wire
 from rig.reasons import rig_error
 from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
+from tests.refusals import refused
 from tests.tables import cases
 
 VERSION = shipped_firmware(DRIVE.board.name)
@@ -195,12 +196,10 @@ def _with(at: int, value: bytes, size: int = 4):
 )
 def test_a_file_that_must_not_be_flashed(tmp_path, change, message):
     (file := tmp_path / "it.uf2").write_bytes(change(DRIVE.image_path.read_bytes()))
-    with pytest.raises(InputError, match=message):
-        read_image(file, DRIVE)
+    refused(InputError, message, read_image, file, DRIVE)
 
 
 def test_an_image_of_another_kind(tmp_path):
-    with pytest.raises(InputError):
-        read_image(TARGETS["mega"].image_path, DRIVE)
-    with pytest.raises(InputError, match="no whole record of an Intel HEX file"):
-        read_image(DRIVE.image_path, TARGETS["mega"])
+    mega = TARGETS["mega"]
+    refused(InputError, "", read_image, mega.image_path, DRIVE)
+    refused(InputError, "no whole record of an Intel HEX", read_image, DRIVE.image_path, mega)

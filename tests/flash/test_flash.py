@@ -8,6 +8,7 @@ from rig.errors import InputError
 from rig.flash.boards import TARGETS
 from rig.flash.image import read_image
 from tests.flash.pty_board import PtyBoard, silent_port
+from tests.refusals import refused
 from tests.tables import cases
 
 VERSION = read_image(TARGETS["mega"].image_path, TARGETS["mega"]).firmware
@@ -180,8 +181,8 @@ def test_every_damaged_digit_is_found(file):
     line, end = image(*GOOD).splitlines()
     for n in range(1, len(line)):
         other = "0" if line[n] != "0" else "1"
-        with pytest.raises(InputError, match=r"it\.hex:1:1: "):
-            read_image(file(f"{line[:n]}{other}{line[n + 1 :]}\n{end}\n"), UNO)
+        damaged = file(f"{line[:n]}{other}{line[n + 1 :]}\n{end}\n")
+        refused(InputError, r"it\.hex:1:1: ", read_image, damaged, UNO)
 
 
 @pytest.mark.parametrize(
@@ -204,10 +205,8 @@ def test_every_damaged_digit_is_found(file):
     ],
 )
 def test_what_must_not_be_flashed(file, text, says):
-    with pytest.raises(InputError, match=says):
-        read_image(file(text), UNO)
+    refused(InputError, says, read_image, file(text), UNO)
 
 
 def test_a_file_that_is_not_there(tmp_path):
-    with pytest.raises(InputError, match="No such file"):
-        read_image(tmp_path / "none.hex", UNO)
+    refused(InputError, "No such file", read_image, tmp_path / "none.hex", UNO)

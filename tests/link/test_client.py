@@ -118,9 +118,8 @@ def test_who_never_answers_is_asked_a_few_times_whatever_patience_a_bad_line_nee
 ):
     """Each time: at first, behind what a boot loader is told, and when it should have let go."""
     port = FakePort(clock, {})
-    with pytest.raises(DeviceTimeoutError, match="did not answer Identify") as caught:
-        Device(port, clock, tries=tries).connect()
-    assert "cable" in caught.value.hint
+    one = Device(port, clock, tries=tries)
+    assert "cable" in refused(DeviceTimeoutError, "did not answer Identify", one.connect).hint
     frames = [frame for data in port.written for frame in Decoder().feed(data)]
     assert [frame.type for frame in frames] == [wire.CODES[wire.Identify]] * 3 * asked
 
@@ -178,8 +177,8 @@ def test_seq_wraps_around_zero(clock):
 
 
 def test_nonsense_is_said_to_be_nonsense(clock):
-    with pytest.raises(DeviceError, match="answered Status with Pong"):
-        device(clock, {wire.Status: [wire.Pong(1)]}).status()
+    confused = device(clock, {wire.Status: [wire.Pong(1)]})
+    refused(DeviceError, "answered Status with Pong", confused.status)
 
 
 @pytest.mark.parametrize("ask", [Device.status, Device.receive, Device.statistics])

@@ -24,6 +24,7 @@ from rig.protocol.site import gravity_at
 from rig.protocol.yamltree import load, place_of
 from tests.analysis.drops import FENCE, UNIFORM, case
 from tests.protocol.test_protocol_reader import GOOD
+from tests.refusals import refused
 from tests.tables import cases, protocol_text
 
 TWO = protocol_text("two-chains")
@@ -99,9 +100,7 @@ def test_every_prior_has_a_key_and_what_is_left_out_is_as_by_default():
 
 @cases
 def test_what_is_no_prior_is_refused_at_its_place(text, said):
-    with pytest.raises(InputError) as caught:
-        scene(text)
-    (problem,) = caught.value.problems
+    (problem,) = refused(InputError, "", scene, text).problems
     assert problem.line == len(UNIFORM.text.splitlines()) + 2
     assert said in str(problem)
 
