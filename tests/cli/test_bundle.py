@@ -20,7 +20,7 @@ from rig.commands import bundling
 from rig.errors import InputError
 from tests.cli.lab import PROTOCOLS, short
 from tests.once import once
-from tests.session.altering import unguarded
+from tests.session.altering import alter, unguarded
 from tests.tables import cases
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -136,8 +136,7 @@ def test_a_byte_altered_anywhere_is_found_and_named(bundle, tmp_path):
 def test_an_altered_row_is_named_even_where_all_is_hashed_anew(sql, named, files, call, tmp_path):
     session, altered = tmp_path / "session", tmp_path / "altered.eln"
     session.write_bytes(files[SESSION])
-    with unguarded(session) as connection:
-        connection.execute(sql)
+    alter(session, sql)
     forge(altered, {**files, SESSION: session.read_bytes()})
     for file in (altered, session):
         assert named in call("verify", file, code=3).out

@@ -14,7 +14,7 @@ from rig.errors import RigError
 from rig.records import ClockSample, HostBreak, Job, Pulse
 from rig.results.whole import calibration, protocol_of
 from rig.session.store import Session
-from tests.session.altering import unguarded
+from tests.session.altering import alter, unguarded
 from tests.tables import cases
 
 pytestmark = pytest.mark.usefixtures("analysed_once", "undrawn")
@@ -138,10 +138,7 @@ def test_a_damaged_drop_is_called_damaged_and_the_others_are_analysed(
 ):
     path = tmp_path / "altered"
     path.write_bytes(sound.read_bytes())
-    with unguarded(path) as connection:
-        if bytes_too:
-            connection.execute("DELETE FROM bytes")
-        connection.execute(sql)
+    alter(path, *["DELETE FROM bytes"] * bytes_too, sql)
     check(call, without, path, tmp_path, "edge", sql)
     found = json.loads(call("analyze", "--json", path, code=3).out)
     assert [run["run"] for run in found["runs"] if run.get("damaged")] == [2]

@@ -27,7 +27,7 @@ from rig.session.store import Session
 from tests.flash.pty_board import PtyBoard, silent_port
 from tests.selftest.benches import LoopedBoard, Wire, fire_drop, hold_drop, port_of
 from tests.selftest.broken import claims, odd
-from tests.session.altering import unguarded
+from tests.session.altering import alter
 from tests.tables import cases
 
 HZ = 16_000_000
@@ -248,8 +248,7 @@ def test_a_session(tmp_path):
     assert whole == [
         *((f"session {path}", "whole"), ("restarts", "none"), ("supply", "not measured"))
     ]
-    with unguarded(path) as connection:
-        connection.execute("DELETE FROM meta WHERE key = 'simulated'")
+    alter(path, "DELETE FROM meta WHERE key = 'simulated'")
     (damaged,) = check_session(str(path))
     assert damaged.what.startswith("damaged: ")
     assert damaged.what.endswith("s.session: it does not say simulated")

@@ -16,6 +16,7 @@ from rig.recover.examine import describe, examine
 from rig.recover.save import save
 from rig.replay import replay
 from rig.session.store import Session
+from tests.session.altering import alter
 
 ROOT = Path(__file__).parents[2]
 
@@ -36,18 +37,6 @@ def content(path):
             "simulated": session.simulated,
             "rest": [session.pings(), session.identities(), session.meta["origin"]],
         }
-
-
-def alter(path, *statements):
-    """Alter a session behind its back; nothing of what was there is left in a free page."""
-    with closing(sqlite3.connect(path)) as connection:
-        for table in ("edge", "drop", "meta", "protocol", "identity"):
-            for verb in ("delete", "update"):
-                connection.execute(f"DROP TRIGGER {table}_no_{verb}")
-        for statement in statements:
-            connection.execute(statement)
-        connection.commit()
-        connection.execute("VACUUM")
 
 
 @pytest.fixture(scope="module")
@@ -161,6 +150,7 @@ from rig.link.messages import Status
 from rig.records import Drop, Edge
 from rig.session.schema import RunState
 from rig.session.store import Session
+from tests.session.altering import alter
 session = Session.create(sys.argv[1], "protocol: 1", "p.yaml", simulated=False, origin="x")
 for run in range(1, 30):
     edges = tuple(Edge(1000 * n, n % 3, n % 2 == 0) for n in range(50))

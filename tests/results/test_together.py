@@ -12,7 +12,7 @@ from rig.protocol import reader
 from rig.results.together import SessionPart, results_together, same_owners
 from rig.session.store import Session
 from tests.cli.lab import PROTOCOLS, record
-from tests.session.altering import unguarded
+from tests.session.altering import alter
 from tests.tables import cases
 
 
@@ -138,8 +138,7 @@ def test_an_unfinished_session_is_refused_unless_it_is_asked_for(two, tmp_path):
 
 def test_a_damaged_session_is_refused(two, tmp_path):
     copy = shutil.copy(two[0], tmp_path / "copy.session")
-    with unguarded(copy) as connection:
-        connection.execute('UPDATE "drop" SET crc32 = crc32 + 1 WHERE id = 2')
+    alter(copy, 'UPDATE "drop" SET crc32 = crc32 + 1 WHERE id = 2')
     refused("records_damaged", InputError, two[1], copy)
 
 

@@ -21,7 +21,7 @@ from rig.session.hashes import protocol_first
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, TABLES, RunState
 from rig.session.store import Session
 from tests.refusals import refused
-from tests.session.altering import unguarded
+from tests.session.altering import LATER, alter, outdate
 from tests.tables import cases
 
 TEXT = "protocol: 1\ntitle: Übung\n"
@@ -117,30 +117,17 @@ def test_everything_comes_back_as_it_went_in(path):
     assert [entry.name for entry in path.parent.iterdir()] == [path.name]
 
 
-LATER = {  # columns and tables that formats after the first have added
-    2: ["release_sense"],
-    3: ["reference", "host_break"],
-    4: ["pulse_ticks", "pulse_end", "restarts", "supply_mv", "lowest_mv"],
-    5: ["attachment", "hash"],
-}
-
-
-def make_older(path, version):
-    """Make a session, filled, one of an older format, as its program wrote it."""
+@pytest.fixture
+def filled(path):
     with make(path) as session:
         fill(session)
-    with closing(sqlite3.connect(path)) as connection:
-        for name in (name for since, names in LATER.items() if since > version for name in names):
-            table = name in TABLES
-            sql = f"DROP TABLE {name}" if table else f'ALTER TABLE "drop" DROP COLUMN {name}'
-            connection.execute(sql)
-        connection.execute(f"PRAGMA user_version = {version}")
-        connection.execute("VACUUM")
+    return path
 
 
 @pytest.mark.parametrize("version", range(1, SCHEMA_VERSION))
-def test_a_file_of_an_older_format_is_read_and_continued(path, version):
-    make_older(path, version)
+def test_a_file_of_an_older_format_is_read_and_continued(filled, version):
+    path = filled
+    outdate(path, version)
     lost = [name for since in (2, 4) if since > version for name in LATER[since]]
     account = replace(DEVICE_DROP.certificate, **dict.fromkeys(lost))
     without = replace(DEVICE_DROP, certificate=account)
@@ -175,17 +162,13 @@ def test_latest_drops_are_the_last_attempts(path):
 
 @pytest.mark.parametrize("table", TABLES)
 @cases
-def test_raw_records_are_never_altered(path, table, statement):
-    with make(path) as session:
-        fill(session)
-    refuse(path, statement.format(table=f'"{table}"', column=f'"{TABLES[table].names()[-1]}"'))
+def test_raw_records_are_never_altered(filled, table, statement):
+    refuse(filled, statement.format(table=f'"{table}"', column=f'"{TABLES[table].names()[-1]}"'))
 
 
-def test_a_drop_is_not_replaced_under_another_number(path):
-    with make(path) as session:
-        fill(session)
+def test_a_drop_is_not_replaced_under_another_number(filled):
     columns = ", ".join(TABLES["drop"].names()[1:])
-    refuse(path, f'INSERT OR REPLACE INTO "drop" SELECT id + 100, {columns} FROM "drop"')
+    refuse(filled, f'INSERT OR REPLACE INTO "drop" SELECT id + 100, {columns} FROM "drop"')
 
 
 def refuse(path, statement):
@@ -365,12 +348,11 @@ def database(path, *sql):
 
 
 def altered(sql):
-    def alter(path):
+    def make_altered(path):
         make(path).close()
-        with unguarded(path) as connection:
-            connection.execute(sql)
+        alter(path, sql)
 
-    return alter
+    return make_altered
 
 
 def hollow(path):
@@ -447,25 +429,20 @@ def test_what_is_as_recorded_has_no_fault(sound, tmp_path):
 def test_what_is_not_as_recorded_is_named(sql, fault, sound, tmp_path):
     path = tmp_path / "altered"
     shutil.copy(sound, path)
-    with unguarded(path) as connection:
-        if "7 - id" in sql:
-            connection.execute("UPDATE ping SET id = -id WHERE id IN (3, 4)")
-            sql = "UPDATE ping SET id = 7 + id WHERE id < 0"
-        connection.execute(sql)
+    alter(path, *sql.split("; "))
     damage = examine(path).damage
     assert any(line.startswith("table " + fault) for line in damage), damage
 
 
-def test_an_old_file_has_no_chain_and_a_continued_one_says_since_when(tmp_path):
-    path = tmp_path / "old"
-    make_older(path, 4)
+def test_an_old_file_has_no_chain_and_a_continued_one_says_since_when(filled):
+    path = filled
+    outdate(path, 4)
     before = path.read_bytes()
     assert (faults(path), first(path), path.read_bytes()) == ([], None, before)
     with Session.open(path) as session:
         record(session, 7)
     assert (faults(path), first(path)) == ([], None)
-    with unguarded(path) as connection:
-        connection.execute("UPDATE ping SET tick = 1 WHERE id = 1")
+    alter(path, "UPDATE ping SET tick = 1 WHERE id = 1")
     assert faults(path) != [], "its older rows are hashed from then on"
 
 
