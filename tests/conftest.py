@@ -6,7 +6,7 @@ import inspect
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Container, Iterator
 from pathlib import Path
 
 import pytest
@@ -14,6 +14,7 @@ from hypothesis import settings
 from hypothesis.internal.conjecture import providers
 
 from tests.once import loops_compiled  # noqa: F401 - a fixture
+from tests.programs import Done, end
 
 # `./run test` says the same every time: the same examples, and none that an earlier run has left.
 # To look for new ones is for `./run bench search`, which keeps what it finds under .hypothesis/.
@@ -98,6 +99,23 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     items[:] = [
         one for number in range(workers) for of in (waiting, computing) for one in share(of, number)
     ]
+
+
+@pytest.fixture
+def call(capsys: pytest.CaptureFixture[str]) -> Callable[..., Done]:
+    """Call ``rig`` in this process, and see that it ends with a code, or one of several."""
+
+    def run(*arguments: object, code: int | Container[int] = 0) -> Done:
+        from rig.cli import main
+
+        capsys.readouterr()
+        try:
+            ended = main([str(argument) for argument in arguments])
+        except SystemExit as stop:  # argparse's way
+            ended = stop.code
+        return end(ended, *capsys.readouterr(), code)
+
+    return run
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -1,8 +1,26 @@
 """Other programs, run to their end."""
 
 import subprocess
+from collections.abc import Container
+from typing import NamedTuple
 
 from tests.waiting import PATIENCE_S
+
+
+class Done(NamedTuple):
+    """How a command ended."""
+
+    code: int
+    out: str
+    err: str
+
+
+def end(code: int, out: str, err: str, codes: int | Container[int] = 0) -> Done:
+    """See that a command ended with a code, or one of several, and never with a traceback."""
+    __tracebackhide__ = True
+    assert code == codes if isinstance(codes, int) else code in codes, out + err
+    assert "Traceback" not in err, err
+    return Done(code, out, err)
 
 
 def run_program(*words: object, code: int | None = 0, timeout: float | None = PATIENCE_S, **more):

@@ -5,8 +5,6 @@ A figure that was measured is written as a link to the page of docs/results in w
 given one (a setting, a limit, a dimension, an example), in ``given_figures.yaml`` with its origin.
 """
 
-from __future__ import annotations
-
 import csv
 import re
 from functools import cache

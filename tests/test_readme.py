@@ -1,7 +1,5 @@
 """Commands of all pages work as printed, in an installed wheel; what README shows is so."""
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

@@ -1,7 +1,5 @@
 """The pages as a site: all of them are there, and a link that leads nowhere ends the build."""
 
-from __future__ import annotations
-
 import importlib.util
 import re
 from pathlib import Path

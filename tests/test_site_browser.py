@@ -3,8 +3,6 @@
 Of `./run bench soaks`, for a browser is large; `test_site.py` holds what can be told without one.
 """
 
-from __future__ import annotations
-
 import json
 import lzma
 import os

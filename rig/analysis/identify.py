@@ -98,9 +98,7 @@ class Identification:
     def reading(self) -> Reading | None:
         """The best reading, fitted; `None` like `drop`."""
         drop = self.drop
-        if drop is None:
-            return None
-        return weigh(drop if isinstance(drop, Fit) else settle(drop.model, drop.x, drop.matches))
+        return None if drop is None else weigh(settle(drop.model, drop.x, drop.matches))
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,10 +183,10 @@ def most_votes(protocol: Protocol, record: ChainRecord, clock_u: float) -> int:
 
 def well_read(fit: Fit) -> bool:
     """Whether nearly all matchable edges are matched, with usual scatter and unknowns in range."""
-    matchable = sum(possible(record) for record in fit.model.records.values())
-    expected = sum(record.edge_count for record in fit.model.records.values())
-    missed = max(matchable, math.ceil(LEAST * expected)) - fit.match_count
-    whole = missed <= most_missed(fit.model.protocol, matchable)
+    records = fit.model.records.values()
+    least = math.ceil(LEAST * sum(record.edge_count for record in records))
+    matchable = max(least, sum(map(possible, records)))
+    whole = matchable - fit.match_count <= most_missed(fit.model.protocol, matchable)
     strain = float(np.abs(fit.model.unknowns.pull(fit.x)).max())
     return whole and fit.estimate.scatter < RESTLESS and strain < STRAY
 

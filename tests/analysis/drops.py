@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
@@ -146,9 +147,13 @@ def case(
     return Case(protocol, lab.runs[number], drop, told[0], TimeScale(rate, clock_u))
 
 
-def true_value(truth: Truth, name: str) -> float:
-    """What a quantity really was, by its JSON name."""
-    return getattr(truth, name)
+def assert_true(
+    result: DropResult, truth: Truth, most: float = 1.0, names: Iterable[str] = ()
+) -> None:
+    """See that measurands, all or some, are what they really were: within so many of their U."""
+    for name in names or result.quantities:
+        measured = result.quantities[name]
+        assert abs(measured.value - getattr(truth, name)) < most * measured.expanded, name
 
 
 def wrong_rods(result: DropResult, truth: Truth) -> list[int]:

@@ -29,6 +29,7 @@ from tests.analysis.drops import (
     SINGLE,
     UNIFORM,
     Case,
+    assert_true,
     case,
     codes,
     first_run,
@@ -145,13 +146,7 @@ def half_the_speed(one: Case) -> list[Edge]:
     return [edge._replace(tick=2 * edge.tick) for edge in one.drop.edges]
 
 
-WRONG = [
-    upside_down,
-    backwards,
-    shuffled_channels,
-    gates_the_other_way_up,
-    half_the_speed,
-]
+WRONG = [upside_down, backwards, shuffled_channels, gates_the_other_way_up, half_the_speed]
 
 
 @pytest.mark.parametrize("change", WRONG)
@@ -198,8 +193,7 @@ def test_a_dead_gate_is_said_and_harms_nothing_but_the_number_of_edges(channel):
     of_gate = {edge.kind for edge in lenient.unmatched if edge.channel == channel}
     assert of_gate == {"dead gate"}
     assert lenient.quantities.keys() == one.analyze().quantities.keys()
-    for name, measured in lenient.quantities.items():
-        assert abs(measured.value - getattr(one.truth, name)) < measured.expanded
+    assert_true(lenient, one.truth)
     result = dead.analyze()
     missed = lenient.audit.missed / (lenient.audit.matched + lenient.audit.missed)
     assert result.verdict == ("void" if missed > 0.05 else "marginal")
@@ -300,8 +294,7 @@ def test_a_chain_of_few_rods(scene, rods):
     result = one.analyze()
     assert result.verdict == "accepted"
     assert result.matches == {n: edge[3] for n, edge in enumerate(one.truth.edges)}
-    for name, measured in result.quantities.items():
-        assert abs(measured.value - getattr(one.truth, name)) < 0.01 * measured.u
+    assert_true(result, one.truth, 0.005)
     printable(result)
 
 
@@ -310,9 +303,7 @@ def test_air_that_pushes_is_told_of_beyond_its_own_uncertainty(share, pushed):
     u = 0.5 * 4.0  # of the unknown in its own units, and one of these
     fit = SimpleNamespace(
         model=SimpleNamespace(
-            protocol=UNIFORM,
-            unknowns={"drag": slice(0, 1)},
-            kappa=lambda _x: -share * _SURE * u,
+            protocol=UNIFORM, unknowns={"drag": slice(0, 1)}, kappa=lambda _x: -share * _SURE * u
         ),
         estimate=SimpleNamespace(x=[0.0], inverse=np.array([[0.5]]), sd=[4.0], scatter=1.0),
     )

@@ -19,7 +19,7 @@ from rig.analysis.session import analyze
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.reader import parse
 from sim.lab import ChainLab
-from tests.analysis.drops import STATED, UNIFORM, case, true_value, with_dials
+from tests.analysis.drops import STATED, UNIFORM, assert_true, case, with_dials
 from tests.analysis.sessions import MILD, analysis, cases, fit_session, fits
 
 FOUR = (1, 2, 3, 4)
@@ -270,8 +270,7 @@ def test_where_little_scatters_and_few_gates_tell_of_it_the_joint_fit_settles(la
         least = LEAST_SHARE * getattr(STATED, name)
         assert getattr(found.joint.components, name) >= least * (1.0 - 1e-12), name
     for one, result in zip(drops, found.runs, strict=True):
-        for name, measured in result.quantities.items():
-            assert abs(measured.value - true_value(one.truth, name)) < 4.0 * measured.u, name
+        assert_true(result, one.truth, 2.0)
 
 
 def test_few_drops_teach_nothing():

@@ -14,7 +14,6 @@ from rig.bench.references import own_error
 from rig.bench.scenes import ladder
 from rig.bench.stability import examine, of_fall
 from rig.bench.work import EPSILON, relative_error
-from rig.cli import main
 
 
 @pytest.mark.parametrize("number", range(5))
@@ -40,11 +39,10 @@ def test_impacts_at_once_are_the_limit_of_short_ones():
     assert errors[1] == pytest.approx(errors[0] / 100, rel=0.1)
 
 
-def test_the_command_writes_all_of_it(tmp_path, monkeypatch, capsys):
+def test_the_command_writes_all_of_it(tmp_path, monkeypatch, call):
     some = [beam_fit(0.5e-3), fall_time()]
     monkeypatch.setattr("rig.commands.bench_precision.problems", lambda quick: some)
-    assert cli.main(["bench", "precision", "--quick", "-o", str(tmp_path)]) == 0
-    printed = capsys.readouterr().out
+    printed = call("bench", "precision", "--quick", "-o", tmp_path).out
     assert "left out: fit-0.5mm, Cholesky" in printed
     points = json.loads((tmp_path / "precision.json").read_text("utf-8"))["points"]
     with (tmp_path / "precision.csv").open(newline="", encoding="utf-8") as stream:
@@ -90,7 +88,7 @@ def test_a_wrong_digit_is_seen(monkeypatch, name):
     assert verdicts.count("FAILED") == 1
 
 
-def test_a_scene_gains_nothing_that_it_does_not_have(monkeypatch, capsys, tmp_path):
+def test_a_scene_gains_nothing_that_it_does_not_have(monkeypatch, call, tmp_path):
     steps = {name: ladder()[name] for name in ("free fall", "whole")}
     monkeypatch.setattr(scenes, "ladder", lambda: dict(steps))
     monkeypatch.setattr(scenes, "_PROBES", 1)
@@ -98,8 +96,7 @@ def test_a_scene_gains_nothing_that_it_does_not_have(monkeypatch, capsys, tmp_pa
     ready.mkdir()
     (ready / "mine.yaml").write_text(ladder()["inclined"], "utf-8")
     command = ["bench", "scenes", "--rounds", "1", "--protocols", str(ready)]
-    assert main([*command, "-o", str(kept)]) == 0
-    assert "no scene gained what it does not have" in capsys.readouterr().out
+    assert "no scene gained what it does not have" in call(*command, "-o", kept).out
     listed = json.loads((kept / "scenes.json").read_text("utf-8"))["scenes"]
     assert [scene["scene"] for scene in listed] == [*steps, "mine"]
     assert [scene["calls"]["g(θ)"] for scene in listed] == [0, 30, 1]
@@ -109,13 +106,12 @@ def test_a_scene_gains_nothing_that_it_does_not_have(monkeypatch, capsys, tmp_pa
     assert (kept / "scenes.svg").read_text("utf-8").lstrip().startswith("<?xml")
 
 
-def test_what_a_scene_gains_fails(monkeypatch, capsys, tmp_path):
+def test_what_a_scene_gains_fails(monkeypatch, call, tmp_path):
     parts = {**scenes.PARTS, "gates": {"rig.model.chain"}}  # as if falls needed gates
     monkeypatch.setattr(scenes, "PARTS", parts)
     monkeypatch.setattr(scenes, "_PROBES", 1)
     monkeypatch.setattr(scenes, "ladder", lambda: {"whole": ladder()["level surface"]})
     command = ["bench", "scenes", "--rounds", "1", "--protocols", "nowhere"]
-    assert main([*command, "-o", str(tmp_path)]) == 1
-    assert "whole gained rig.model.chain (gates)" in capsys.readouterr().out
+    assert "whole gained rig.model.chain (gates)" in call(*command, "-o", tmp_path, code=1).out
     (level,) = json.loads((tmp_path / "scenes.json").read_text("utf-8"))["scenes"]
     assert (level["calls"]["g(θ)"], level["calls"]["falls"]) == (0, 1)

@@ -163,23 +163,21 @@ def test_what_is_kept_and_cannot_be_read_is_computed_again(fence, counted, monke
     assert len(counted) == 4
 
 
-def test_doctor_tells_the_size_and_forgets(fence, capsys):
-    capsys.readouterr()
-    main(["doctor"])
-    line = next(one for one in capsys.readouterr().out.splitlines() if "kept results" in one)
+def test_doctor_tells_the_size_and_forgets(fence, call):
+    told = call("doctor", code={0, 4}).out
+    line = next(one for one in told.splitlines() if "kept results" in one)
     assert str(CacheFolder().folder) in line
     assert " 5 of " in line  # four drops and their session
-    main(["doctor", "--clear-cache"])
-    assert "kept results: ok: 0 of " in capsys.readouterr().out
+    assert "kept results: ok: 0 of " in call("doctor", "--clear-cache", code={0, 4}).out
 
 
-def test_a_blind_session_keeps_no_numbers(tmp_path, capsys):
+def test_a_blind_session_keeps_no_numbers(tmp_path, call):
     text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
     path = record(tmp_path, f"{text}\nblind: true\n", "sim://?seed=3")
     assert CacheFolder().size().entries == 1
     with rig.open(path) as session:
         hidden = session.analyze()
     assert not any("gravity_m_s2" in run.quantities for run in hidden.runs)
-    assert main(["unblind", str(path)]) == 0
+    call("unblind", path)
     with rig.open(path) as session:
         assert session.analyze().runs[0].gravity.u > 0.0

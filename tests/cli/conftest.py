@@ -1,12 +1,12 @@
-"""A small finished session, and ``rig`` called inside this process."""
+"""Small finished sessions and protocols."""
 
 import json
 import shutil
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 
@@ -16,15 +16,8 @@ from tests.once import (
     analysed_once,  # noqa: F401 - a fixture
     filled_once,
 )
+from tests.programs import Done
 from tests.report.undrawn import undrawn  # noqa: F401 - a fixture
-
-
-class Done(NamedTuple):
-    """How a call ended."""
-
-    code: int
-    out: str
-    err: str
 
 
 @dataclass(frozen=True)
@@ -45,8 +38,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
     def fill(folder: Path) -> None:
         protocol, session = folder / "short.yaml", folder / "short.session"
         protocol.write_text(short(), "utf-8")
-        done = rig("run", protocol, "--port", "sim://", "--session", session, "--seed", 1)
-        told = done.returncode, done.stdout, done.stderr
+        told = rig("run", protocol, "--port", "sim://", "--session", session, "--seed", 1)
         (folder / "told.json").write_text(json.dumps(told), "utf-8")
 
     folder = filled_once(tmp_path_factory, "finished", fill)
@@ -72,7 +64,7 @@ def analysis(finished: Finished, tmp_path_factory: pytest.TempPathFactory) -> di
     """What ``rig analyze --json`` prints of the finished session."""
 
     def fill(folder: Path) -> None:
-        said = rig("analyze", finished.session, "--json").stdout
+        said = rig("analyze", finished.session, "--json").out
         (folder / "said.json").write_text(said, "utf-8")
 
     folder = filled_once(tmp_path_factory, "analysis", fill)
@@ -86,9 +78,7 @@ def page(finished: Finished, tmp_path_factory: pytest.TempPathFactory) -> Path:
     def fill(folder: Path) -> None:
         path = folder / "alone" / "report.html"
         path.parent.mkdir()
-        done = rig("report", finished.session, "-o", path)
-        assert (done.returncode, done.stdout) == (0, ""), done.stderr
-        assert done.stderr == f"report: {path}\n"
+        assert rig("report", finished.session, "-o", path) == (0, "", f"report: {path}\n")
 
     return filled_once(tmp_path_factory, "page", fill) / "alone" / "report.html"
 
@@ -107,22 +97,6 @@ def fence(tmp_path: Path) -> Path:
     path = tmp_path / "fence.yaml"
     path.write_text(short_fence(), "utf-8")
     return path
-
-
-@pytest.fixture
-def call(capsys: pytest.CaptureFixture[str]) -> Callable[..., Done]:
-    """Call ``rig`` in this process."""
-
-    def run(*arguments: object) -> Done:
-        capsys.readouterr()
-        try:
-            code = main([str(argument) for argument in arguments])
-        except SystemExit as stop:  # argparse's way
-            code = stop.code
-        out, err = capsys.readouterr()
-        return Done(code, out, err)
-
-    return run
 
 
 @pytest.fixture(autouse=True)

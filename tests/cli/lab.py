@@ -12,6 +12,7 @@ from rig.cli import main
 from rig.replay import replay
 from rig.session.schema import RunState
 from rig.session.store import Session
+from tests.programs import Done, end
 from tests.tables import protocol_text
 from tests.waiting import PATIENCE_S
 
@@ -68,17 +69,12 @@ def command(*arguments: object) -> list[str]:
     return [sys.executable, "-W", "error", "-m", "rig", *map(str, arguments)]
 
 
-def rig(*arguments: object, **options: Any) -> subprocess.CompletedProcess[str]:
-    """Run ``rig`` as a process of its own."""
+def rig(*arguments: object, code: int = 0, **options: Any) -> Done:
+    """Run ``rig`` as a process of its own, and see that it ends with a code."""
     streams = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    return subprocess.run(
-        command(*arguments),
-        cwd=ROOT,
-        text=True,
-        timeout=PATIENCE_S,
-        check=False,
-        **{**streams, **options},
-    )
+    settings = {"cwd": ROOT, "text": True, "timeout": PATIENCE_S}
+    done = subprocess.run(command(*arguments), check=False, **settings | streams | options)
+    return end(done.returncode, done.stdout or "", done.stderr or "", code)
 
 
 def truth_of(session: Path) -> list[dict[str, Any]]:

@@ -118,8 +118,8 @@ def test_a_session_is_shown_however_short_it_was(daemon, tmp_path):
 @pytest.mark.parametrize("place", [":x", "nowhere.invalid:8080", ":99999", "a b:80", "", "TAKEN"])
 def test_a_place_that_cannot_be_had_is_refused(daemon, call, place):
     place = f":{daemon[2]}" if place == "TAKEN" else place
-    refused = call("daemon", "--port", "sim://", "--socket", "x", f"--board={place}")
-    assert (refused.code, "--board" in refused.err) == (2, True), refused.err
+    refused = call("daemon", "--port", "sim://", "--socket", "x", f"--board={place}", code=2)
+    assert "--board" in refused.err
 
 
 @pytest.fixture

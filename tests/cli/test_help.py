@@ -22,8 +22,8 @@ def commands():
 def test_every_command_has_a_group_and_two_examples(call):
     known = commands()
     assert [name for name in COMMANDS if " " not in name] == list(known)
-    done = call()
-    assert (done.code, done.out) == (2, "")
+    done = call(code=2)
+    assert done.out == ""
     for name in known:
         assert f"\n  {name} " in done.err
         assert len(COMMANDS[name].examples) >= 2
@@ -80,7 +80,4 @@ def test_examples_are_commands(line):
 
 @cases
 def test_a_mistake_is_named(call, words, said):
-    done = call(*words)
-    assert done.code in {2, 4}
-    assert said in done.err
-    assert "Traceback" not in done.err
+    assert said in call(*words, code={2, 4}).err

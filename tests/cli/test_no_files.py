@@ -102,8 +102,7 @@ def test_every_command_that_takes_a_file_is_tried():
 )
 def test_what_is_no_file_is_refused_in_words(case, thing, places, request, call):
     words = [str({**places, "X": thing}.get(word, word)) for word in COMMANDS[case].split()]
-    done = call(case[0], *words)
-    assert done.code == (4 if case[0] == "doctor" else 2), done
+    done = call(case[0], *words, code=4 if case[0] == "doctor" else 2)
     kind = request.node.callspec.params["thing"]
     assert f"it is a {kind}" in done.out + done.err
     assert re.search(r"thing|/dev/zero", done.out + done.err)

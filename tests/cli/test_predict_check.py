@@ -16,9 +16,7 @@ FIELDS = {*read_table(__file__, "fields")["predictions"]}
 def test_json_has_every_field_of_every_incline(call):
     """That the numbers are right is for tests/model and tests/test_predictions.py."""
     path = PROTOCOLS / "inclined-uniform.yaml"
-    done = call("predict", path, "--json")
-    assert done.code == 0
-    lines = json.loads(done.out)["predictions"]
+    lines = json.loads(call("predict", path, "--json").out)["predictions"]
     assert lines == [one.json() for one in predictions(read(path))]
     assert [line["incline_deg"] for line in lines] == list(range(0, 90, 10))
     assert all(line.keys() >= FIELDS for line in lines)
@@ -39,8 +37,9 @@ def test_the_table_says_the_same(call):
 
 
 def test_a_given_alpha_needs_no_surface_numbers(call):
-    done = call("predict", PROTOCOLS / "bead-chain.yaml", "--json")
-    (line,) = json.loads(done.out)["predictions"]
+    (line,) = json.loads(call("predict", PROTOCOLS / "bead-chain.yaml", "--json").out)[
+        "predictions"
+    ]
     assert (line["alpha"], line["gamma"]) == (0.12, 0.0)
     assert line["separation_u_m"] > 0.0
 
@@ -56,7 +55,7 @@ def untried(monkeypatch):
 def test_check_says_what_is_there_and_what_was_left_out(call, protocol):
     """And README, which boards can do it."""
     done = call("check", protocol)
-    assert (done.code, done.err) == (0, "")
+    assert done.err == ""
     title, blank, scene, *rest = done.out.splitlines()
     assert f"title: {title}" in protocol.read_text("utf-8")
     assert (blank, scene) == ("", "Scene")
@@ -76,12 +75,11 @@ def test_check_says_what_is_there_and_what_was_left_out(call, protocol):
 @pytest.mark.usefixtures("untried")
 def test_check_for_one_board_is_its_refusal(call):
     graded = "protocols/graded-chain.yaml"
-    code, _, _ = call("check", graded, "--board", "mega")
-    assert code == 0
-    code, out, err = call("check", graded, "--board", "uno")
-    assert (code, out) == (2, "")
+    call("check", graded, "--board", "mega")
+    done = call("check", graded, "--board", "uno", code=2)
+    assert done.out == ""
     said = "gates.free[4].channel: found 12; the board (Arduino Uno) has gates 0 to 11: change this"
-    assert f"{said}, or use a Raspberry Pi Pico or an Arduino Mega 2560" in err
+    assert f"{said}, or use a Raspberry Pi Pico or an Arduino Mega 2560" in done.err
 
 
 def test_check_counts_runs_and_trial_drops(call, finished):

@@ -11,6 +11,7 @@ import pytest
 from bench.mutants import make_session
 from rig import door
 from rig.results.live import LiveAnalysis
+from tests.session.altering import outdate
 from tests.tables import read_table
 
 WRITER = """
@@ -34,13 +35,7 @@ def fresh(session):
 
 
 def of_the_first_format(session):
-    with closing(sqlite3.connect(session)) as connection:
-        for table in ("reference", "host_break", "attachment", "hash"):
-            connection.execute(f"DROP TABLE {table}")
-        for column in ("release_sense", "pulse_ticks", "pulse_end", "restarts", "supply_mv"):
-            connection.execute(f'ALTER TABLE "drop" DROP COLUMN {column}')
-        connection.execute('ALTER TABLE "drop" DROP COLUMN lowest_mv')
-        connection.execute("PRAGMA user_version = 1")
+    outdate(session, 1)
 
 
 def with_kept_results(session):
@@ -83,9 +78,8 @@ def read_all(call, session, out, commands=COMMANDS):
             word.replace("SESSION", str(session)).replace("OUT", str(out / str(number)))
             for word in words
         ]
-        done = call(*given)
         # A doctor's word is of this computer too, and a fence has no impacts to estimate.
-        assert done.code == 0 or words[0] in {"doctor", "estimate"}, (words, done.err)
+        call(*given, code={"doctor": {0, 4}, "estimate": {0, 2}}.get(words[0], 0))
         yield words
     with door.open(session) as opened:
         opened.analyze()

@@ -1,12 +1,15 @@
 """Protocols by name, the only board by `auto`, and `rig` alone."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-from rig.cli import main
 from rig.ready import find_protocol, ready_protocols
+from rig.usb.listing import SerialPort
+from tests.waiting import until
 
 READY = Path(__file__).parents[2] / "protocols"
 
@@ -17,24 +20,21 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_every_ready_protocol_is_listed_with_its_title(capsys):
-    assert main(["ready"]) == 0
-    rows = capsys.readouterr().out.splitlines()
+def test_every_ready_protocol_is_listed_with_its_title(call):
+    rows = call("ready").out.splitlines()
     assert {row.split()[0] for row in rows} == {path.stem for path in READY.glob("*.yaml")}
     assert "A ball past four gates" in next(row for row in rows if row.startswith("falling-ball"))
 
 
-def test_a_ready_protocol_is_copied_once(folder, capsys):
-    assert main(["ready", "glider"]) == 0
+def test_a_ready_protocol_is_copied_once(folder, call):
+    call("ready", "glider")
     copy = folder / "glider.yaml"
     assert copy.read_bytes() == (READY / "glider.yaml").read_bytes()
-    assert main(["ready", "glider"]) == 2
-    assert "glider.yaml already exists" in capsys.readouterr().err
+    assert "glider.yaml already exists" in call("ready", "glider", code=2).err
 
 
-def test_an_unknown_one_is_refused_by_what_there_is(folder, capsys):
-    assert main(["ready", "../glider"]) == 2
-    assert "accepted: bead-chain, falling-ball" in capsys.readouterr().err
+def test_an_unknown_one_is_refused_by_what_there_is(folder, call):
+    assert "accepted: bead-chain, falling-ball" in call("ready", "../glider", code=2).err
     assert not [*folder.iterdir()]
 
 
@@ -56,62 +56,50 @@ def test_a_file_in_the_folder_wins(folder):
     ("paths", "sentence"),
     [((), "no board found"), (("/dev/a", "/dev/b"), "boards are at /dev/a and /dev/b")],
 )
-def test_no_board_and_several_are_said(folder, monkeypatch, capsys, paths, sentence):
+def test_no_board_and_several_are_said(folder, monkeypatch, call, paths, sentence):
     plug(monkeypatch, *paths)
-    line = ["run", "falling-ball", "--port", "auto", "--session", "s"]
-    assert main(line) == 4
-    assert capsys.readouterr().err.startswith(f"{sentence}\n")
+    done = call("run", "falling-ball", "--port", "auto", "--session", "s", code=4)
+    assert done.err.startswith(f"{sentence}\n")
 
 
-def test_the_only_board_is_taken(folder, monkeypatch, capsys):
+def test_the_only_board_is_taken(folder, monkeypatch, call):
     plug(monkeypatch, str(folder / "ttyACM7"))
-    assert main(["selftest", "--port", "auto"]) == 4
-    assert f"{folder / 'ttyACM7'}" in capsys.readouterr().err
+    assert f"{folder / 'ttyACM7'}" in call("selftest", "--port", "auto", code=4).err
 
 
 def plug(monkeypatch, *paths):
-    from rig.usb.listing import SerialPort
-
     ports = [SerialPort(path) for path in paths] + [SerialPort("/dev/modem", skipped="a modem")]
     monkeypatch.setattr("rig.usb.listing.serial_ports", lambda: ports)
 
 
 @pytest.mark.parametrize("seen", [True, False])
-def test_rig_alone_opens_the_terminal_where_there_is_one(monkeypatch, capsys, seen):
+def test_rig_alone_opens_the_terminal_where_there_is_one(monkeypatch, call, seen):
     shown = []
     monkeypatch.setattr("rig.commands.tui.main", lambda arguments: shown.append(arguments) or 0)
     for stream in ("stdin", "stdout"):
         monkeypatch.setattr(f"sys.{stream}.isatty", lambda: seen)
-    assert main([]) == (0 if seen else 2)
+    assert ("usage: rig" in call(code=0 if seen else 2).err) != seen
     assert len(shown) == seen
-    assert ("usage: rig" in capsys.readouterr().err) != seen
 
 
 @pytest.mark.parametrize("name", ["a/b", "", "..", "ä", "x" * 41])
-def test_a_rig_s_name_is_a_plain_word(name, capsys):
-    with pytest.raises(SystemExit) as end:
-        main(["daemon", "--port", "sim://", "--name", name])
-    assert end.value.code == 2
-    assert "accepted: letters, digits, - and _" in capsys.readouterr().err
+def test_a_rig_s_name_is_a_plain_word(name, call):
+    done = call("daemon", "--port", "sim://", "--name", name, code=2)
+    assert "accepted: letters, digits, - and _" in done.err
 
 
-def test_two_rigs_have_two_daemons(folder, monkeypatch, processes_of):
+def test_two_rigs_have_two_daemons(folder, call, processes_of):
     """Each daemon has a socket of its own, and a run goes through the one that is named."""
     places = [folder / "chainrig" / f"rig{name}.sock" for name in ("-left", "-right", "")]
     processes_of("left", "right")
     assert [place.exists() for place in places] == [True, True, False]
     line = "run falling-ball --port sim:// --session {}.session --yes --name {}"
-    assert main(line.format("left", "left").split()) == 0
-    assert main(line.format("none", "middle").split()) == 4
+    call(*line.format("left", "left").split())
+    call(*line.format("none", "middle").split(), code=4)
 
 
 @pytest.fixture
 def processes_of(folder, monkeypatch):
-    import subprocess
-    import sys
-
-    from tests.waiting import until
-
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(folder))
     running = []
 

@@ -7,7 +7,9 @@ import subprocess
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from itertools import count
+from unittest.mock import Mock
 
 import pytest
 
@@ -22,17 +24,7 @@ from rig.replay import replay
 from rig.results.whole import calibration, results
 from rig.session.schema import RunState
 from rig.session.store import Session
-from tests.cli.lab import (
-    ROOT,
-    assert_whole,
-    command,
-    drops_of,
-    log_of,
-    rig,
-    short,
-    short_fence,
-    truth_of,
-)
+from tests.cli import lab
 from tests.waiting import PATIENCE_S, until
 
 
@@ -45,7 +37,7 @@ def protocol(fence):
 def stopped(arguments, session, number, wait_s):
     """Start a campaign, and send it a signal some time after it has begun."""
     process = subprocess.Popen(
-        command(*arguments), cwd=ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+        lab.command(*arguments), cwd=lab.ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
         stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     lock = session.with_name(session.name + ".lock")
@@ -92,13 +84,11 @@ def campaign(folder, numbers, longest_s, seed, pace, text):
         with Session.open(session, readonly=True) as opened:
             assert replay(opened).differences == (), f"after {ends}"
         if number != signal.SIGKILL:
-            fallen = {(line["run"], line["attempt"]) for line in truth_of(session)}
+            fallen = {(line["run"], line["attempt"]) for line in lab.truth_of(session)}
             if signal.SIGKILL not in numbers:
-                assert fallen == set(drops_of(session)), "whatever fell is recorded"
-    done = rig(*arguments)
-    assert done.returncode == 0, done.stderr
-    assert "Traceback" not in done.stderr
-    assert_whole(session, 3)
+                assert fallen == set(lab.drops_of(session)), "whatever fell is recorded"
+    lab.rig(*arguments)
+    lab.assert_whole(session, 3)
     return session, ends
 
 
@@ -106,7 +96,7 @@ def campaign(folder, numbers, longest_s, seed, pace, text):
 def test_signals_at_random_moments_of_a_real_time_campaign_cost_no_run(tmp_path):
     int_, term, kill = signal.SIGINT, signal.SIGTERM, signal.SIGKILL
     cases = [(int_, term), (kill, kill), (term, kill, int_)]
-    text = short("40 deg", 3, "0.2 s")
+    text = lab.short("40 deg", 3, "0.2 s")
     with ThreadPoolExecutor(len(cases)) as pool:
         made = list(
             pool.map(
@@ -121,7 +111,7 @@ def test_signals_at_random_moments_of_a_real_time_campaign_cost_no_run(tmp_path)
             found = results(opened).json()
         assert abs(clock["error_ppm"] + 1300.0) < 5.0 * clock["u_ppm"], ends
         assert clock["u_ppm"] < 200.0
-        truth = {(line["run"], line["attempt"]): line for line in truth_of(session)}
+        truth = {(line["run"], line["attempt"]): line for line in lab.truth_of(session)}
         for run in found["runs"]:
             true = truth[run["run"], run["attempt"]]
             for name in ("separation_m", "speed_m_s", "release_skew_s"):
@@ -130,7 +120,7 @@ def test_signals_at_random_moments_of_a_real_time_campaign_cost_no_run(tmp_path)
 
 def test_signals_at_random_moments_of_a_fast_campaign_cost_no_run(tmp_path):
     """In virtual time nearly every moment is one of work, not of waiting."""
-    cases, text = [(signal.SIGTERM,), (signal.SIGKILL,)], short_fence(3)
+    cases, text = [(signal.SIGTERM,), (signal.SIGKILL,)], lab.short_fence(3)
     with ThreadPoolExecutor(2) as pool:
         made = pool.map(
             lambda case: campaign(tmp_path, case[1], 0.25, case[0], 0, text), enumerate(cases)
@@ -143,9 +133,8 @@ def test_signals_at_random_moments_of_a_fast_campaign_cost_no_run(tmp_path):
 
 @pytest.fixture
 def run(call, tmp_path, protocol):
-    return lambda *more: call(
-        "run", protocol, "--port", "sim://?seed=1", "--session", tmp_path / "s", *more
-    )
+    words = ("run", protocol, "--port", "sim://?seed=1", "--session", tmp_path / "s")
+    return partial(call, *words)
 
 
 @pytest.mark.parametrize(
@@ -160,15 +149,13 @@ def test_a_signal_between_a_byte_and_what_it_means_waits(run, tmp_path, monkeypa
         store(session, *what, **more)
 
     monkeypatch.setattr(Session, record, interrupted)
-    done = run()
+    assert run(code=130).out == ""
     assert next(number) > which
-    assert done.code == 130
-    assert done.out == ""
     monkeypatch.undo()
     with Session.open(tmp_path / "s", readonly=True) as session:
         assert replay(session).differences == ()
-    assert run().code == 0
-    assert_whole(tmp_path / "s", 2)
+    run()
+    lab.assert_whole(tmp_path / "s", 2)
 
 
 @pytest.mark.parametrize(
@@ -189,13 +176,13 @@ def test_whoever_stops_before_the_release_sees_nothing_fall(
         ask = getattr(Worker, name)
         monkeypatch.setattr(Worker, name, lambda *a, ask=ask, **k: (ask(*a, **k), asked.set())[0])
     monkeypatch.setattr(Session, "add_state", add)
-    assert run().code == 130
-    assert truth_of(tmp_path / "s") == []
+    run(code=130)
+    assert lab.truth_of(tmp_path / "s") == []
     monkeypatch.undo()
-    assert run().code == 0
-    assert_whole(tmp_path / "s", 2)
-    assert (1, RunState.INTERRUPTED) in log_of(tmp_path / "s")[1]
-    assert (1, 1) not in drops_of(tmp_path / "s")
+    run()
+    lab.assert_whole(tmp_path / "s", 2)
+    assert (1, RunState.INTERRUPTED) in lab.log_of(tmp_path / "s")[1]
+    assert (1, 1) not in lab.drops_of(tmp_path / "s")
 
 
 @pytest.mark.parametrize("state", [RunState.RECORDED, RunState.ACCEPTED])
@@ -210,12 +197,12 @@ def test_a_drop_that_is_recorded_when_the_signal_comes_is_not_made_again(
             signal.raise_signal(signal.SIGTERM)
 
     monkeypatch.setattr(Session, "add_state", add)
-    assert run().code == 130
+    run(code=130)
     monkeypatch.undo()
-    assert drops_of(tmp_path / "s") == [(1, 1)]
-    assert run().code == 0
-    assert drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
-    assert_whole(tmp_path / "s", 2)
+    assert lab.drops_of(tmp_path / "s") == [(1, 1)]
+    run()
+    assert lab.drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
+    lab.assert_whole(tmp_path / "s", 2)
 
 
 # ------------------------------------------------- what keeps the signals waiting
@@ -320,58 +307,48 @@ def cut_off_in_the_fall(run, monkeypatch, state=RunState.FIRED):
     """Lose the connection just before the drop is read, or just before it is acknowledged."""
     fail = {RunState.FIRED: "collect", RunState.RECORDED: "acknowledge"}[state]
 
-    def broken(device, *_):
-        raise DeviceError("connection lost: somebody stumbled")
-
+    lost = DeviceError("connection lost: somebody stumbled")
     with monkeypatch.context() as patch:
-        patch.setattr(Device, fail, broken)
-        done = run()
-    assert done.code == 4
-    return done
+        patch.setattr(Device, fail, Mock(side_effect=lost))
+        run(code=4)
 
 
 @pytest.mark.parametrize("state", [RunState.FIRED, RunState.RECORDED])
 def test_a_drop_that_the_board_still_holds_is_fetched(run, tmp_path, monkeypatch, one_board, state):
     cut_off_in_the_fall(run, monkeypatch, state)
-    assert log_of(tmp_path / "s")[1][-1] == (1, state)
+    assert lab.log_of(tmp_path / "s")[1][-1] == (1, state)
     one_board(2.0)  # the recording ends
-    done = run()
-    assert done.code == 0
-    assert "fetching run 1, attempt 1, from the device" in done.err
-    assert drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
-    assert len(truth_of(tmp_path / "s")) == 2
-    assert_whole(tmp_path / "s", 2)
+    assert "fetching run 1, attempt 1, from the device" in run().err
+    assert lab.drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
+    assert len(lab.truth_of(tmp_path / "s")) == 2
+    lab.assert_whole(tmp_path / "s", 2)
 
 
 @pytest.mark.parametrize("one_board", ["board restarts"], indirect=True)
 def test_a_drop_that_a_restart_cut_short_is_made_again(run, tmp_path, monkeypatch, one_board):
     cut_off_in_the_fall(run, monkeypatch)
-    done = run()
-    assert done.code == 0
-    assert "fetching" not in done.err
-    assert log_of(tmp_path / "s")[1][2:4] == [(1, RunState.INTERRUPTED), (2, RunState.ARMED)]
-    assert drops_of(tmp_path / "s") == [(1, 2), (2, 1)]
-    assert_whole(tmp_path / "s", 2)
+    assert "fetching" not in run().err
+    assert lab.log_of(tmp_path / "s")[1][2:4] == [(1, RunState.INTERRUPTED), (2, RunState.ARMED)]
+    assert lab.drops_of(tmp_path / "s") == [(1, 2), (2, 1)]
+    lab.assert_whole(tmp_path / "s", 2)
 
 
 @pytest.mark.parametrize("one_board", ["board restarts"], indirect=True)
 def test_a_drop_of_another_session_is_neither_taken_nor_discarded(
     call, run, tmp_path, protocol, monkeypatch, one_board
 ):
-    def other(name):
-        return call("run", protocol, "--port", "sim://", "--session", tmp_path / name, "--seed", 1)
+    def other(name, **ends):
+        words = ("run", protocol, "--port", "sim://", "--session", tmp_path / name)
+        return call(*words, "--seed", 1, **ends)
 
-    assert other("older").code == 0
+    other("older")
     cut_off_in_the_fall(run, monkeypatch)
     one_board(2.0)
     for name in ("newer", "older"):
-        before = drops_of(tmp_path / name) if name == "older" else []
-        done = other(name)
-        assert done.code == 4
+        before = lab.drops_of(tmp_path / name) if name == "older" else []
+        done = other(name, code=4)
         assert "session" in done.err
         assert "taking the power from the board discards the drop" in done.err
-        assert drops_of(tmp_path / name) == before
-    done = run()
-    assert done.code == 0
-    assert "fetching run 1, attempt 1" in done.err
-    assert_whole(tmp_path / "s", 2)
+        assert lab.drops_of(tmp_path / name) == before
+    assert "fetching run 1, attempt 1" in run().err
+    lab.assert_whole(tmp_path / "s", 2)

@@ -1,5 +1,6 @@
 """A device that will not arm or fire costs time, and never a run."""
 
+from functools import partial
 from itertools import count
 
 import pytest
@@ -16,9 +17,8 @@ ARMED, FIRED, INTERRUPTED = RunState.ARMED, RunState.FIRED, RunState.INTERRUPTED
 
 @pytest.fixture
 def run(call, tmp_path, fence):
-    return lambda: call(
-        "run", fence, "--port", "sim://?seed=1", "--session", tmp_path / "s", "--yes"
-    )
+    words = ("run", fence, "--port", "sim://?seed=1", "--session", tmp_path / "s", "--yes")
+    return partial(call, *words)
 
 
 @pytest.fixture
@@ -72,9 +72,7 @@ HAPPENINGS = [
 @pytest.mark.parametrize(("happen", "why"), HAPPENINGS)
 def test_a_drop_that_is_not_let_go_is_prepared_again(run, tmp_path, once_armed, happen, why):
     once_armed(happen, times=2)
-    done = run()
-    assert done.code == 0, done.err
-    assert done.err.count(f"not fired: {why}") == 2
+    assert run().err.count(f"not fired: {why}") == 2
     entries = log_of(tmp_path / "s")[1]
     unfired = [(n, state) for n in (1, 2) for state in (ARMED, FIRED, INTERRUPTED)]
     assert entries[:7] == [*unfired, (3, ARMED)]
@@ -88,13 +86,12 @@ def test_a_drop_that_is_not_let_go_is_prepared_again(run, tmp_path, once_armed, 
 @pytest.mark.parametrize(("happen", "why"), [HAPPENINGS[0], HAPPENINGS[3]])
 def test_a_device_that_never_lets_go_is_not_asked_for_ever(run, tmp_path, once_armed, happen, why):
     once_armed(happen, times=5)
-    done = run()
-    assert done.code == 4
+    done = run(code=4)
     assert why in done.err
     assert "hint" in done.err
     assert [n for n, state in log_of(tmp_path / "s")[1] if state == INTERRUPTED] == [1, 2, 3, 4, 5]
     assert log_of(tmp_path / "s")[1][-1] == (5, INTERRUPTED)
-    assert run().code == 0
+    run()
     assert_whole(tmp_path / "s", 2)
 
 
@@ -109,9 +106,7 @@ def test_an_open_stop_is_waited_for_a_little(run, tmp_path, monkeypatch, looks, 
             recorder._port.board.stop(step == 1)
 
     monkeypatch.setattr(Recorder, "wait", waited)
-    done = run()
-    assert done.code == code
-    assert ("the emergency stop is open" in done.err) == (code == 4)
+    assert ("the emergency stop is open" in run(code=code).err) == (code == 4)
     assert len(drops_of(tmp_path / "s")) == (2 if code == 0 else 0)
 
 

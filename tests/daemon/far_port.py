@@ -1,7 +1,5 @@
 """A port in another room: what ser2net and its like do, with pyserial's own RFC 2217 server."""
 
-from __future__ import annotations
-
 import contextlib
 import select
 import socket

@@ -28,7 +28,6 @@ from sim.clock import VirtualClock
 from sim.serial_port import SimulatedSerial
 from tests.link.bench import ScriptedLab, falling_rods
 
-PLANNED = 1
 CHANGES = falling_rods(2)
 RECORDING = Phase.RECORDING
 LONGEST_S = 120.0
@@ -78,7 +77,7 @@ class Box:
 
     def __init__(self, folder, monkeypatch):
         self.protocol, self.session = folder / "fence.yaml", folder / "session"
-        self.protocol.write_text(FENCE.replace("RUNS", str(PLANNED)), "utf-8")
+        self.protocol.write_text(FENCE.replace("RUNS", "1"), "utf-8")
         self.clock = VirtualClock()
         self.fell: list[tuple[int, int]] = []
         self.board = VirtualBoard(ScriptedLab(changes=CHANGES))
@@ -224,13 +223,12 @@ class Box:
 
     def coming(self):
         """Run and attempt that come next by the file; `None` when all are done."""
-        for run in range(1, PLANNED + 1):
-            with closing(sqlite3.connect(self.session)) as other:
-                sql = "SELECT attempt, state FROM run_state WHERE run = ? ORDER BY id"
-                entries = other.execute(sql, (run,)).fetchall()
-            if not entries or entries[-1][1] not in ("accepted", "recorded"):
-                return run, entries[-1][0] + 1 if entries else 1
-        return None
+        with closing(sqlite3.connect(self.session)) as other:
+            sql = "SELECT attempt, state FROM run_state WHERE run = 1 ORDER BY id"
+            entries = other.execute(sql).fetchall()
+        if entries and entries[-1][1] in ("accepted", "recorded"):
+            return None
+        return 1, entries[-1][0] + 1 if entries else 1
 
     def arm(self, client="A"):
         job = self.coming()
@@ -327,11 +325,7 @@ class Box:
                 controller.due, type(worker._trouble).__name__, self.lease.holder,
                 worker._holder, self.line is not None,
             )  # fmt: skip
-        log = [
-            self.on_disk("state", (run, attempt))[-1:]
-            for run in range(1, PLANNED + 1)
-            for attempt in (1, 2)
-        ]
+        log = [self.on_disk("state", (1, attempt))[-1:] for attempt in (1, 2)]
         held = board.drop is not None
         valid = [*self.tokens][-1] == board._token if self.tokens else None
         return rig, board.phase, held, self.board.outputs(), str(log), valid, len(self.tokens) > 1

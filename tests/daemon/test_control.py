@@ -17,6 +17,7 @@ from rig.link.messages import TABLE, Abort, DropCertificate2, Fire, Phase
 from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.daemon.at_work import states, working
+from tests.refusals import refused
 from tests.waiting import PATIENCE_S, until
 
 
@@ -44,8 +45,7 @@ def gone_on_with(processes):
 def test_two_clients_that_race_for_control_do_not_both_get_it(processes, client):
     one, two = client("one"), client("two")
     one.take_control()
-    with pytest.raises(ControlError, match="one has control"):
-        two.take_control()
+    refused(ControlError, "one has control", two.take_control)
     for forbidden in (
         lambda: two.open_session(str(processes.protocol), str(processes.session)),
         lambda: two.arm(1, 1),
@@ -64,16 +64,12 @@ def test_two_clients_that_race_for_control_do_not_both_get_it(processes, client)
 
 def test_what_comes_next_is_the_daemons_to_know(processes, armed):
     one, _ = armed
-    with pytest.raises(InputError, match="not the moment"):
-        one.arm(1, 2)
+    refused(InputError, "not the moment", one.arm, 1, 2)
     one.stop("tried")
     for run, attempt in ((1, 1), (1, 3), (9, 1)):
-        with pytest.raises(InputError, match="does not come next"):
-            one.arm(run, attempt)
-    with pytest.raises(InputError, match="cannot be accepted"):
-        one.log_state(1, 1, RunState.ACCEPTED)
-    with pytest.raises(StoppedError, match="tried"):
-        one.fire(0)
+        refused(InputError, "does not come next", one.arm, run, attempt)
+    refused(InputError, "cannot be accepted", one.log_state, 1, 1, RunState.ACCEPTED)
+    refused(StoppedError, "tried", one.fire, 0)
     assert states(processes) == [(1, 1, "armed"), (1, 1, "interrupted")]
 
 
@@ -88,8 +84,7 @@ def test_a_client_that_hangs_while_armed_disarms(processes, armed):
     silent = r"nothing was heard from the driver for \d\.\d s, so it lost control"
     assert re.fullmatch(silent, reason.text)
     one, token = armed
-    with pytest.raises(StoppedError, match=reason.text):
-        one.fire(token)
+    refused(StoppedError, reason.text, one.fire, token)
 
 
 def test_any_client_stops_a_recording_and_what_there_is_is_kept(processes, armed, client):
@@ -154,8 +149,7 @@ def test_a_stop_ends_a_wait(driver, client):
     two, waiting = client("two"), driver.line.ask("wait", seconds=600)
     while not waiting.done():  # a stop may overtake even the request for the wait
         two.stop("no need")
-    with pytest.raises(StoppedError, match="no need"):
-        waiting.result()
+    refused(StoppedError, "no need", waiting.result)
     assert driver.arm(1, 1)
 
 

@@ -3,13 +3,12 @@
 import re
 import signal
 
-import pytest
-
 from bench.process_fixture import ProcessFixture
 from rig.daemon.lease import Lease
 from rig.daemon.worker import Worker
 from rig.errors import RigError
 from rig.recorder.published import PublishedState
+from tests.refusals import refused
 from tests.waiting import PATIENCE_S
 
 
@@ -59,8 +58,7 @@ def test_a_fault_of_the_program_is_logged_with_its_traceback_once(caplog):
     worker = Worker("sim://", PublishedState(), lease)
     worker.start()
     try:
-        with pytest.raises(RigError, match="internal error"):
-            worker.submit(lambda _: 1 / 0, "me").result(PATIENCE_S)
+        refused(RigError, "internal error", worker.submit(lambda _: 1 / 0, "me").result, PATIENCE_S)
     finally:
         worker.end()
         worker.join()

@@ -12,42 +12,34 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from bench.process_fixture import FENCE
+from rig import errors
 from rig.daemon import rpc
 from rig.daemon.client import Client, Line
 from rig.daemon.lease import LEASE_S, Lease
 from rig.daemon.listener import Door
 from rig.daemon.replica import Replica
 from rig.daemon.worker import Worker
-from rig.errors import (
-    ControlError,
-    DeviceError,
-    DeviceTimeoutError,
-    DomainError,
-    InputError,
-    RigError,
-    SessionError,
-    VersionError,
-)
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.reasons import rig_error
 from rig.recorder.controller import Controller
 from rig.recorder.interrupts import Interrupts
 from rig.recorder.published import EDGES_LIMIT, PublishedState
+from tests.refusals import refused
 from tests.tables import cases
 from tests.waiting import PATIENCE_S
 
 ERRORS = [
-    RigError("something"),
-    InputError("a typo", "line 3"),
-    SessionError("the disk is full", "free some space"),
-    DeviceError("connection lost", "check the cable"),
-    DeviceTimeoutError("silent"),
+    errors.RigError("something"),
+    errors.InputError("a typo", "line 3"),
+    errors.SessionError("the disk is full", "free some space"),
+    errors.DeviceError("connection lost", "check the cable"),
+    errors.DeviceTimeoutError("silent"),
     DeviceRefusedError(RefusalReason.GATE_BLOCKED, 0b101),
     DeviceRefusedError(RefusalReason.NOT_ARMED, 0, DisarmReason.HOST_SILENT),
-    ControlError("taken"),
+    errors.ControlError("taken"),
     rig_error("stopped", text="stopped by Ada"),
-    VersionError("old"),
+    errors.VersionError("old"),
 ]
 
 
@@ -66,17 +58,17 @@ def test_a_refusal_has_its_code_and_values_as_results_have_them():
     (reason,) = data["reason_codes"]
     assert (reason["code"], reason["values"]) == ("refused_gate_blocked", {"channels": [1, 3]})
     assert data["message"] == "gates 1, 3 are blocked"
-    assert rpc.error_to_data(InputError("no"))["reason_codes"] == []
+    assert rpc.error_to_data(errors.InputError("no"))["reason_codes"] == []
 
 
 def test_an_error_of_a_kind_nobody_listed_becomes_the_one_above_it():
-    again = rpc.error_from_data(rpc.error_to_data(DomainError("Eq. 13 is singular")))
-    assert type(again) is InputError
+    again = rpc.error_from_data(rpc.error_to_data(errors.DomainError("Eq. 13 is singular")))
+    assert type(again) is errors.InputError
 
 
 def test_an_error_of_a_kind_only_the_daemon_knows_is_an_error_all_the_same():
     again = rpc.error_from_data({"kind": "NewerError", "message": "m", "hint": "h", "exit_code": 3})
-    assert (type(again), str(again), again.exit_code) == (RigError, "m\n  hint: h", 3)
+    assert (type(again), str(again), again.exit_code) == (errors.RigError, "m\n  hint: h", 3)
 
 
 @given(st.binary(max_size=200))
@@ -119,8 +111,7 @@ def test_who_is_no_daemon_is_told_so(tmp_path, told, why):
         with line:
             line.recv(1 << 10)
             line.sendall(told.encode("latin-1"))
-        with pytest.raises(DeviceError, match=why):
-            client.result()
+        refused(errors.DeviceError, why, client.result)
 
 
 class Time:
@@ -136,10 +127,8 @@ def test_one_client_has_control_until_it_is_not_heard():
     time = Time()
     lease = Lease(time)
     lease.take("one", "rig run 1")
-    with pytest.raises(ControlError, match="rig run 1 has control"):
-        lease.take("two", "tui 2")
-    with pytest.raises(ControlError, match="rig run 1 has it"):
-        lease.require("two")
+    refused(errors.ControlError, "rig run 1 has control", lease.take, "two", "tui 2")
+    refused(errors.ControlError, "rig run 1 has it", lease.require, "two")
     time.now = LEASE_S - 0.1
     lease.heard("two")  # says nothing of the first
     lease.heard("one")
@@ -232,8 +221,7 @@ def test_the_edges_of_an_endless_drop_do_not_fill_the_memory():
 def test_a_replica_does_not_swallow_a_gap():
     replica = Replica()
     replica.follow("snapshot", {"n": 3, "state": {"edges": []}})
-    with pytest.raises(ValueError, match="change 5 behind 3"):
-        replica.follow("change", {"n": 5})
+    refused(ValueError, "change 5 behind 3", replica.follow, "change", {"n": 5})
 
 
 @pytest.mark.parametrize(("worker_comes", "times"), [(False, 5), (True, 1)])

@@ -10,6 +10,7 @@ from rig.link.refusals import DeviceRefusedError
 from rig.replay import replay
 from rig.session.schema import RunState
 from rig.session.store import Session
+from tests.refusals import refused
 from tests.waiting import until
 
 
@@ -31,8 +32,8 @@ def armed(driver):
     """Arm as soon as the release has rested three times as long as it was on."""
     try:
         return driver.arm(1, 1)
-    except DeviceRefusedError as refused:
-        if refused.reason is not RefusalReason.COOLING:
+    except DeviceRefusedError as error:
+        if error.reason is not RefusalReason.COOLING:
             raise
         return 0
 
@@ -58,14 +59,12 @@ def test_it_is_driven_for_the_protocols_pulse_and_is_no_run(processes, driver):
 def test_it_needs_control_a_session_and_nothing_armed(processes, client):
     one, other = client("one"), client("other")
     one.take_control()
-    with pytest.raises(InputError, match="not the moment"):
-        one.call("test_release")
+    refused(InputError, "not the moment", one.call, "test_release")
     one.open_session(str(processes.protocol), str(processes.session))
     with pytest.raises(ControlError):
         other.call("test_release")
     one.arm(1, 1)
-    with pytest.raises(InputError, match="not the moment"):
-        one.call("test_release")
+    refused(InputError, "not the moment", one.call, "test_release")
     assert not driven(processes)
 
 
@@ -73,9 +72,8 @@ def test_an_open_emergency_stop_refuses_it(processes, driver):
     driver.arm(1, 1)
     processes.hand("stop 1")
     until(lambda: driver.session.latest_state(1).state is RunState.INTERRUPTED)
-    with pytest.raises(DeviceRefusedError) as refused:
-        driver.call("test_release")
-    assert refused.value.reason is RefusalReason.STOPPED
+    error = refused(DeviceRefusedError, "", driver.call, "test_release")
+    assert error.reason is RefusalReason.STOPPED
     assert not driven(processes)
 
 

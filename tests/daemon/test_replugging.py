@@ -1,7 +1,5 @@
 """A board that comes back elsewhere or is in another room, and another one where it was."""
 
-from __future__ import annotations
-
 import os
 from contextlib import closing
 

@@ -19,6 +19,7 @@ from rig.daemon.client import AsyncClient, Client, Line
 from rig.daemon.listener import Door
 from rig.daemon.socket_path import default_socket, prepare_folder
 from rig.errors import BusyError, DeviceError, InputError, RigError, VersionError
+from tests.refusals import refused
 from tests.tables import cases
 from tests.waiting import PATIENCE_S
 
@@ -52,10 +53,8 @@ async def test_only_the_user_may_come_near(door):
 
 def test_a_folder_that_is_open_to_others_is_refused(tmp_path):
     tmp_path.chmod(0o755)
-    with pytest.raises(InputError, match="open to other users"):
-        prepare_folder(tmp_path)
-    with pytest.raises(InputError, match="open to other users"):
-        Client(Line(tmp_path / "rig.sock", "t"))
+    refused(InputError, "open to other users", prepare_folder, tmp_path)
+    refused(InputError, "open to other users", Line, tmp_path / "rig.sock", "t")
 
 
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
@@ -68,8 +67,7 @@ def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
 def test_somebody_elses_folder_is_refused(tmp_path, monkeypatch):
     tmp_path.chmod(0o700)
     monkeypatch.setattr(os, "getuid", lambda: tmp_path.stat().st_uid + 1)
-    with pytest.raises(InputError, match="belongs to another user"):
-        prepare_folder(tmp_path)
+    refused(InputError, "belongs to another user", prepare_folder, tmp_path)
 
 
 async def test_another_user_is_not_served(door, monkeypatch):
@@ -164,8 +162,7 @@ def test_a_second_daemon_is_refused_and_a_dead_ones_socket_is_not_in_the_way():
     with ProcessFixture(runs=1) as processes:
         processes.start_daemon()
         first = processes.daemon
-        with pytest.raises(DeviceError, match="another daemon answers"):
-            processes.start_daemon()
+        refused(DeviceError, "another daemon answers", processes.start_daemon)
         processes.kill(processes.daemon)
         processes.kill(first)
         assert processes.socket.exists()
@@ -177,9 +174,7 @@ def test_a_place_that_cannot_be_a_socket_is_refused_and_left_as_it_is(tmp_path):
     tmp_path.chmod(0o700)
     (tmp_path / "my.yaml").write_text("chains")
     for name, why in (("my.yaml", "in use"), (110 * "x", "too long")):
-        with pytest.raises(InputError, match=rf"cannot use .*{why}") as caught:
-            Door(tmp_path / name)
-        assert "--socket" in caught.value.hint
+        assert "--socket" in refused(InputError, rf"cannot use .*{why}", Door, tmp_path / name).hint
     assert (tmp_path / "my.yaml").read_text() == "chains"
 
 
@@ -187,8 +182,7 @@ def test_no_daemon_is_said_so(tmp_path):
     tmp_path.chmod(0o700)
     with pytest.raises(RigError, match=r"no daemon at .*/rig\.sock: No such file or directory"):
         Client(Line(tmp_path / "rig.sock", "t"))
-    with pytest.raises(RigError, match="no daemon at"):
-        asyncio.run(AsyncClient.connect(tmp_path / "rig.sock", "t"))
+    refused(RigError, "no daemon at", asyncio.run, AsyncClient.connect(tmp_path / "rig.sock", "t"))
 
 
 def test_the_usual_place(monkeypatch, tmp_path):
@@ -261,8 +255,7 @@ def test_a_door_at_which_nobody_ever_looks_is_not_waited_at_for_ever(tmp_path, m
         deaf.bind(str(path))
         deaf.listen(0)
         waiting.connect(str(path))  # the kernel keeps one waiting
-        with pytest.raises(BusyError, match="it took no new client"):
-            Client(Line(path, "one more"))
+        refused(BusyError, "it took no new client", Line, path, "one more")
 
 
 async def test_beyond_the_last_client_stop_is_done_and_nothing_else(door, monkeypatch):

@@ -89,8 +89,7 @@ FALLEN = (("arm", None), ("fire_latest", Trouble("killed", "written", 2)))
 
 
 @pytest.mark.parametrize(
-    ("before", "action"),
-    [((), "arm"), ((("arm", None),), "fire_latest"), (FALLEN, "resume")],
+    ("before", "action"), [((), "arm"), ((("arm", None),), "fire_latest"), (FALLEN, "resume")]
 )
 def test_whatever_goes_wrong_at_any_moment_of_a_drop_it_ends_well(
     before, action, tmp_path, monkeypatch

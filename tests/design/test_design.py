@@ -1,7 +1,5 @@
 """What a layout is said to tell: against drops, better layouts, and arithmetic with 60 digits."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import fields, replace
 from decimal import Decimal, localcontext

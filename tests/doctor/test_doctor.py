@@ -2,34 +2,32 @@
 
 import json
 import os
-import pty
 import random
 import re
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import Mock
 
 import pytest
 
-from rig.cli import main
 from rig.command_help import runnable
 from rig.doctor.board import BOARD_CHECKS, mains_ripple
 from rig.doctor.computer import PORT_CHECKS, check_packages, check_room
 from rig.doctor.session import check_restarts, check_session, describe_supply
 from rig.errors import DeviceError
 from rig.link import messages as wire
-from rig.link.messages import RefusalReason
 from rig.link.transcript import Restart
 from rig.records import Certificate, Drop
 from rig.selftest.board import BoardUnderTest, SelftestOptions
 from rig.selftest.findings import Verdict, make_check
 from rig.selftest.run import run_checks
 from rig.session.store import Session
-from tests.flash.pty_board import PtyBoard
+from tests.flash.pty_board import PtyBoard, silent_port
 from tests.selftest.benches import LoopedBoard, Wire, fire_drop, hold_drop, port_of
 from tests.selftest.broken import claims, odd
-from tests.session.altering import unguarded
+from tests.session.altering import alter
 from tests.tables import cases
 
 HZ = 16_000_000
@@ -106,7 +104,9 @@ def test_what_is_wrong_is_said_with_what_to_do(make, check, says, advises):
     assert not re.search(r"[{}]", str(finding))
 
 
-@pytest.mark.parametrize("reason", [RefusalReason.GATE_BLOCKED, RefusalReason.GATE_UNSTEADY])
+@pytest.mark.parametrize(
+    "reason", [wire.RefusalReason.GATE_BLOCKED, wire.RefusalReason.GATE_UNSTEADY]
+)
 @pytest.mark.parametrize("times", [3, 100])
 def test_a_gate_that_forbids_firing_now_and_then_is_tried_again(reason, times, monkeypatch):
     refusals = iter([wire.Refused(reason, 4)] * times)
@@ -168,10 +168,8 @@ def test_restarts_that_only_certificates_tell_of_and_a_supply_that_sinks():
 
 @pytest.fixture
 def terminal():
-    ends = pty.openpty()
-    yield os.ttyname(ends[1])
-    for end in ends:
-        os.close(end)
+    with silent_port() as path:
+        yield path
 
 
 @pytest.fixture
@@ -196,8 +194,7 @@ def verdicts(port):
 
 
 @pytest.mark.parametrize(
-    ("words", "advises"),
-    [(b"screen", "close that program"), (b"rig daemon", "let that daemon")],
+    ("words", "advises"), [(b"screen", "close that program"), (b"rig daemon", "let that daemon")]
 )
 def test_who_has_a_port_open(words, advises, terminal, process):
     process(7, [b"sleep"], "/dev/null")
@@ -251,8 +248,7 @@ def test_a_session(tmp_path):
     assert whole == [
         *((f"session {path}", "whole"), ("restarts", "none"), ("supply", "not measured"))
     ]
-    with unguarded(path) as connection:
-        connection.execute("DELETE FROM meta WHERE key = 'simulated'")
+    alter(path, "DELETE FROM meta WHERE key = 'simulated'")
     (damaged,) = check_session(str(path))
     assert damaged.what.startswith("damaged: ")
     assert damaged.what.endswith("s.session: it does not say simulated")
@@ -263,38 +259,31 @@ def test_a_session(tmp_path):
 
 
 @pytest.fixture
-def doctor(capsys, monkeypatch, tmp_path):
+def doctor(call, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("serial.tools.list_ports.comports", list)
-
-    def call(*arguments):
-        code = main(["doctor", *map(str, arguments)])
-        out, err = capsys.readouterr()
-        return code, out, err
-
-    return call
+    return partial(call, "doctor")
 
 
 def test_a_board_at_a_terminal(doctor):
     with PtyBoard() as there:
-        code, out, err = doctor("--port", there.path)
-    assert code == 0, out
-    assert f"permission for {there.path}: ok: given" in out
-    assert "stop and flickering gates: ok: none within 1 s" in out
-    assert err == "nothing to do\n"
+        done = doctor("--port", there.path)
+    assert f"permission for {there.path}: ok: given" in done.out
+    assert "stop and flickering gates: ok: none within 1 s" in done.out
+    assert done.err == "nothing to do\n"
 
 
 def test_a_port_that_is_not_there_is_not_opened(doctor):
-    code, out, err = doctor("--port", "/dev/nosuch")
-    assert (code, err) == (4, "1 thing to do\n")
-    assert "permission for /dev/nosuch: failed: there is no such port\n  do: is the " in out
-    assert "board: not possible here: its port cannot be used now\n" in out
+    done = doctor("--port", "/dev/nosuch", code=4)
+    assert done.err == "1 thing to do\n"
+    assert "permission for /dev/nosuch: failed: there is no such port\n  do: is the " in done.out
+    assert "board: not possible here: its port cannot be used now\n" in done.out
 
 
 def test_programs_read_codes(doctor, tmp_path):
-    code, out, err = doctor("--json", "--session", tmp_path / "none")
-    missing = json.loads(out)["findings"][-1]
-    assert (code, err) == (4, "1 thing to do\n")
+    done = doctor("--json", "--session", tmp_path / "none", code=4)
+    missing = json.loads(done.out)["findings"][-1]
+    assert done.err == "1 thing to do\n"
     assert missing == {
         "name": f"session {tmp_path / 'none'}",
         "verdict": "failed",
@@ -316,21 +305,19 @@ def test_a_restart_in_a_drop_is_timed_and_found_again_in_the_session(doctor, tmp
         )
         with pytest.raises(DeviceError, match=said):
             device.collect(order["label"])
-    code, out, _ = doctor("--session", path)
-    assert code == 4
+    done = doctor("--session", path, code=4)
     found = (
         r"^restarts: failed: run 3, attempt 2: about [45] ms after FIRE \(brown-out\)\n  do: is "
     )
-    assert re.search(found, out, re.MULTILINE)
+    assert re.search(found, done.out, re.MULTILINE)
 
 
 def test_without_a_port_nothing_is_opened_and_a_damaged_session_is_said(doctor, tmp_path):
-    assert doctor()[0] == 0
+    doctor()
     (tmp_path / "s").write_text("no session")
-    code, out, _ = doctor("--session", tmp_path / "s")
-    assert code == 4
-    assert "not a session: there is nothing of a session in it\n  do: " in out
-    assert runnable("rig run") in out  # as this user can type it
+    done = doctor("--session", tmp_path / "s", code=4)
+    assert "not a session: there is nothing of a session in it\n  do: " in done.out
+    assert runnable("rig run") in done.out  # as this user can type it
 
 
 @cases

@@ -3,8 +3,6 @@
 It shares nothing with the emulator: another language, no loop taken at one go, all registers plain.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 _WORD = 0xFFFFFFFF

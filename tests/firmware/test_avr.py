@@ -5,7 +5,6 @@ import pytest
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
 from rig.link import messages as wire
 from rig.link.frames import Decoder, Frame, encode
-from rig.link.messages import PulseEnd
 from rig.protocol import reader
 from rig_emulator import trials
 from rig_emulator.avr import Avr
@@ -165,7 +164,7 @@ def test_gates_that_never_rest_do_not_lengthen_it(stand, rate):
     recording = trials.storm(stand, rate, 20_000)
     assert pulses(stand, recording) == [[0, 20_000 * _US]] * 2
     assert recording.certificate.pulse_ticks == 20_000 * _US
-    assert recording.certificate.pulse_end == PulseEnd.ORDERED
+    assert recording.certificate.pulse_end == wire.PulseEnd.ORDERED
     assert recording.certificate.overflows > 0
     assert stand.avr.watchdog_resets == 0
     flips = trials.train(len(stand.wiring.gates), 100, 2000)

@@ -12,8 +12,6 @@ avr8js reads the counter one cycle later, in FIRE as in stamps, which cancels. I
 capture, so the reference is tested with the first emulator only.
 """
 
-from __future__ import annotations
-
 import struct
 import subprocess
 import zlib

@@ -13,13 +13,14 @@ import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when 
 from rig.errors import DeviceError, InputError
 from rig.link import messages as wire
 from rig.link.client import Device
-from rig.link.messages import pack_label
-from rig.link.port import open_port, port_clock
+from rig.link.port import open_port
 from rig_emulator.avr import Avr
 from rig_emulator.controller import Stop
 from rig_emulator.wiring import BOARDS, firmware_for
 from tests.firmware.emulated import MCUS
 from tests.firmware.toolchain import make
+from tests.link.talk import connected
+from tests.refusals import refused
 from tests.tables import cases
 from tests.waiting import PATIENCE_S
 
@@ -145,7 +146,7 @@ def url(protocol: Path = FENCE, **settings: object) -> str:
 
 
 def drop_from(device: Device, gates: int = 0b11, record_ms: int = 600):
-    label = pack_label(1, 1)
+    label = wire.pack_label(1, 1)
     device.fire(device.arm(wire.Arm(label=label, gates=gates, record_ms=record_ms, **ORDER)))
     drop = device.collect(label)
     device.acknowledge(label, drop.certificate.crc32)
@@ -154,11 +155,9 @@ def drop_from(device: Device, gates: int = 0b11, record_ms: int = 600):
 
 def talk(where: str):
     """Have one drop: all bytes with their times, the drop, the device's identity, its port."""
-    port = open_port(where)
     chunks: list[tuple] = []
-    device = Device(port, port_clock(port), lambda *chunk: chunks.append(chunk))
-    identity = device.connect()
-    return chunks, drop_from(device), identity, port
+    port, device = connected(where, lambda *chunk: chunks.append(chunk))
+    return chunks, drop_from(device), device.transcript.identity, port
 
 
 @pytest.mark.parametrize("board", sorted(BOARDS))
@@ -187,14 +186,13 @@ def test_a_drop_is_the_truth_to_the_cycle(tmp_path, board):
 
 @cases
 def test_what_is_wrong_in_the_url_is_bad_input(settings, complaint):
-    with pytest.raises(InputError, match=complaint):
-        open_port(url(**settings))
+    refused(InputError, complaint, open_port, url(**settings))
 
 
 @pytest.mark.parametrize("word", rig.boards.BOARDS)
 def test_the_table_of_boards_says_what_the_firmware_says(word):
-    port = open_port(url(board=word))
-    assert Device(port, port_clock(port)).connect().capabilities() == rig.boards.BOARDS[word]
+    _, device = connected(url(board=word))
+    assert device.transcript.identity.capabilities() == rig.boards.BOARDS[word]
 
 
 def test_every_board_of_the_table_can_be_emulated():
@@ -205,9 +203,8 @@ def test_without_a_build_there_is_the_shipped_firmware(monkeypatch, tmp_path):
     package = tmp_path / "rig"
     (package / "flash").mkdir(parents=True)
     monkeypatch.setattr("rig_emulator.wiring.rig.__file__", str(package / "__init__.py"))
-    with pytest.raises(InputError, match="no firmware for atmega2560") as caught:
-        firmware_for(BOARDS["mega"])
-    assert "make -C firmware" in caught.value.hint
+    error = refused(InputError, "no firmware for atmega2560", firmware_for, BOARDS["mega"])
+    assert "make -C firmware" in error.hint
     shipped = package / "flash" / "atmega2560.hex"
     shipped.touch()
     assert firmware_for(BOARDS["mega"]) == shipped
@@ -222,18 +219,15 @@ def test_the_pty_is_a_board_to_any_program(tmp_path):
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
     with subprocess.Popen(command, **pipes) as terminal:
         assert terminal.stdout.readline().strip() == str(link)
-        port = open_port(str(link))
-        device = Device(port, port_clock(port))
-        identity = device.connect(boot_wait_s=0)
+        port, device = connected(str(link), boot_wait_s=0)
+        identity = device.transcript.identity
         assert len(drop_from(device).edges) > 20
         port.close()
-        port = open_port(str(link.readlink()))
-        device = Device(port, port_clock(port))
-        assert device.connect(boot_wait_s=0) == identity
+        port, device = connected(str(link.readlink()), boot_wait_s=0)
+        assert device.transcript.identity == identity
         terminal.stdin.write("reset\n")
         terminal.stdin.flush()
-        with pytest.raises(DeviceError, match="restarted"):
-            device.collect(pack_label(1, 1), timeout=10.0)
+        refused(DeviceError, "restarted", device.collect, wire.pack_label(1, 1), timeout=10.0)
         port.close()
         terminal.stdin.close()
         assert terminal.wait(PATIENCE_S) == 0

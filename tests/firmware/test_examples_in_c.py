@@ -8,13 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from rig.link.client import Device
 from rig.link.messages import Arm, Phase
-from rig.link.port import open_port, port_clock
 from rig.selftest.findings import Verdict
 from tests.firmware.toolchain import FIRMWARE, need
 from tests.flash.pty_board import PtyBoard
 from tests.link.bench import LABEL
+from tests.link.talk import connected
 from tests.programs import run_program
 from tests.selftest.benches import outcomes, port_of
 
@@ -106,9 +105,8 @@ def test_the_device_passes_the_selftest(built):
 
 def test_its_drop_is_read_by_this_project_and_by_the_client(built):
     with device_of(built) as path:
-        with closing(open_port(path)) as port:
-            device = Device(port, port_clock(port))
-            device.connect()
+        port, device = connected(path)
+        with closing(port):
             device.fire(device.arm(Arm(label=LABEL, **ORDER)))
             drop = device.collect(LABEL)
             assert drop.faults == ()
@@ -122,7 +120,6 @@ def test_its_drop_is_read_by_this_project_and_by_the_client(built):
 def test_the_client_reads_a_drop_of_the_simulated_board(built):
     with PtyBoard() as there:
         assert client(built, there.path, 1, 100) == []
-        with closing(open_port(there.path)) as port:
-            device = Device(port, port_clock(port))
-            device.connect(boot_wait_s=0)
+        port, device = connected(there.path, boot_wait_s=0)
+        with closing(port):
             assert device.status().phase is Phase.IDLE

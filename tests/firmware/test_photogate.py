@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from rig.cli import main
 from rig.errors import InputError
 from rig.model import photogate
 from tests.firmware.toolchain import FIRMWARE, need
@@ -67,6 +66,6 @@ def test_the_drawing_has_the_resistors_that_were_computed(board):
     assert "74HC14" not in drawing
 
 
-def test_it_prints_them(capsys):
-    assert main(["gate", "--distance", "60 mm", "--detector", "SFH309FA"]) == 0
-    assert re.search(r"load resistor, Ω +18000\n", capsys.readouterr().out)
+def test_it_prints_them(call):
+    done = call("gate", "--distance", "60 mm", "--detector", "SFH309FA")
+    assert re.search(r"load resistor, Ω +18000\n", done.out)

@@ -17,7 +17,7 @@ from tests.firmware.pico import build, symbol
 from tests.firmware.toolchain import FIRMWARE
 from tests.link.bench import LABEL, ScriptedLab, VirtualBench, falling_rods
 from tests.link.conformance import DeviceConformance
-from tests.link.talk import arm
+from tests.link.talk import arm, connected
 from tests.tables import cases
 
 HZ = 20_000_000
@@ -116,9 +116,7 @@ def test_chains_fall_before_it_by_its_url(tmp_path):
     """Every stamp within a tick of the truth, its clock as far off as the dial says."""
     truth = tmp_path / "truth.jsonl"
     url = f"emu://?board=pico&seed=3&clock=2000ppm&protocol={FENCE}&truth={truth}"
-    port = open_port(url)
-    device = Device(port, port_clock(port))
-    device.connect()
+    port, _ = connected(url)
     # The port is opened anew; the board goes on, and says nothing of a start.
     port.close()
     port.open()

@@ -9,7 +9,6 @@ import pytest
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
 from rig.link import messages as wire
 from rig.link.frames import Decoder, Frame, encode
-from rig.link.messages import DisarmReason, Phase, PulseEnd
 from rig_emulator.stand import Stand
 from rig_emulator.wiring import PICO
 from tests.firmware.pico import build, symbol
@@ -96,7 +95,7 @@ def test_nothing_on_usb_moves_a_pulse_or_loses_a_drop(stand, what):
     stand.hear(20 * MS)
     certificate = stand.ask(wire.Read(wire.pack_label(1, 1), 0, 0))
     assert (certificate.events, certificate.overflows) == (200, 0)
-    assert certificate.pulse_end == PulseEnd.ORDERED
+    assert certificate.pulse_end == wire.PulseEnd.ORDERED
     assert certificate.pulse_ticks == 80_000
     assert chip.watchdog_resets == bitten
     stand.ask(wire.Acknowledge(certificate.label, certificate.crc32))
@@ -113,13 +112,13 @@ def test_what_nobody_reads_disarms_no_later(stand):
         chip.receive(encode(Frame(code, seq, 0, payload)))
     chip.run(chip.cycle + 3 * MS)
     assert chip.take_sent() == []
-    assert chip.peek(symbol("phase"), 1) == bytes([Phase.IDLE])
+    assert chip.peek(symbol("phase"), 1) == bytes([wire.Phase.IDLE])
     chip.reads(True)
     chip.run(chip.cycle + 5 * MS)
     heard = Decoder().feed(b"\0" + bytes(one.value for one in chip.take_sent()))
     said = [wire.unpack(frame.type, frame.payload) for frame in heard]
-    assert said.count(wire.Disarmed(order.label, DisarmReason.TIMEOUT)) == 1
-    assert said[-1].phase is Phase.IDLE
+    assert said.count(wire.Disarmed(order.label, wire.DisarmReason.TIMEOUT)) == 1
+    assert said[-1].phase is wire.Phase.IDLE
 
 
 def test_no_baud_rate_lets_it_go(stand):

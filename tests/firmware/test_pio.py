@@ -1,7 +1,5 @@
 """The programmes of the Pico's PIO: what they do to the clock, in two models of the machine."""
 
-from __future__ import annotations
-
 import random
 
 import pytest

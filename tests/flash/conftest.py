@@ -7,8 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from rig.cli import main
-
 _SCRIPT = """#!{python}
 import json, pathlib, sys
 folder = pathlib.Path(__file__).parent
@@ -50,11 +48,10 @@ def avrdude(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FakeAvrdude:
 
 
 @pytest.fixture
-def flash(capsys):
-    def call(*arguments, board="mega"):
-        code = main(["flash", "--board", board, *map(str, arguments)])
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err
-        return code, out, err
+def flash(call):
+    def run(*arguments, board="mega", code=0):
+        done = call("flash", "--board", board, *arguments, code=code)
+        assert code == 0 or done.out == ""
+        return done
 
-    return call
+    return run

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
-from types import TracebackType
 
 from sim.board import VirtualBoard
 from sim.terminal import Terminal
 from tests.link.bench import ScriptedLab
 
 _LOOK_S = 0.005
+
+
+@contextmanager
+def silent_port() -> Iterator[str]:
+    """Open a port behind which nobody answers."""
+    ends = os.openpty()
+    yield os.ttyname(ends[1])
+    for end in ends:
+        os.close(end)
 
 
 class PtyBoard:
@@ -34,12 +45,7 @@ class PtyBoard:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._over.set()
         self._thread.join()
         self._terminal.pull()

@@ -69,16 +69,14 @@ def test_a_board_cut_off_in_mid_flash_is_flashed_again_and_its_drops_outlive_the
                 until(lambda: there.heard > WRITTEN)
                 there.pull(power=power)
 
-            done = hand.submit(cut)
-            code, out, err = flash("--port", there.path, board=board)
-            assert (code, out) == (4, "")
-            done.result()
-        assert f"flashing {there.path} failed: the connection broke" in err
+            hands = hand.submit(cut)
+            done = flash("--port", there.path, board=board, code=4)
+            hands.result()
+        assert f"flashing {there.path} failed: the connection broke" in done.err
         there.plug()
-        code, out, err = flash("--port", there.path, board=board)
-        assert code == 0, err
-        assert out.startswith(TARGETS[board].board.name)
-        assert out.endswith(": flashed and verified\n")
+        done = flash("--port", there.path, board=board)
+        assert done.out.startswith(TARGETS[board].board.name)
+        assert done.out.endswith(": flashed and verified\n")
         fallen = drop(there, wiring_of(board))
         until(lambda: not there.is_open)
         before = there.restarts
@@ -94,9 +92,7 @@ def test_a_board_cut_off_in_mid_flash_is_flashed_again_and_its_drops_outlive_the
 def test_another_chip_than_the_board_that_was_named_is_not_written(bought, flash):
     with bought("uno") as there:
         before = there.avr.program(0, 256)
-        code, out, err = flash("--port", there.path)
-        assert (code, out) == (4, "")
-        assert "wrong --board" in err
+        assert "wrong --board" in flash("--port", there.path, code=4).err
         assert there.avr.program(0, 256) == before
 
 

@@ -10,17 +10,16 @@ from unittest.mock import Mock
 import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
-from rig.cli import main
 from rig.errors import InputError
 from rig.flash import drive as drives
 from rig.flash import steps
 from rig.flash.boards import DRIVE, TARGETS
 from rig.flash.image import read_image, shipped_firmware
 from rig.link import messages as wire
-from rig.link.messages import RefusalReason
 from rig.reasons import rig_error
 from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
+from tests.refusals import refused
 from tests.tables import cases
 
 VERSION = shipped_firmware(DRIVE.board.name)
@@ -67,11 +66,10 @@ def test_a_pico_is_flashed_and_asked(flash, tmp_path, monkeypatch):
     (drive,) = picos(tmp_path, monkeypatch, "RPI-RP2 of mine")
     with PtyBoard(**NAMES) as there:
         plugged(monkeypatch, there.path, after=3)
-        code, out, err = flash()
-    assert code == 0, err
-    assert f"copying {VERSION} (" in err
-    assert out.startswith(f"Raspberry Pi Pico, {VERSION}, 16 gates, id ")
-    assert out.endswith(": flashed and verified\n")
+        done = flash()
+    assert f"copying {VERSION} (" in done.err
+    assert done.out.startswith(f"Raspberry Pi Pico, {VERSION}, 16 gates, id ")
+    assert done.out.endswith(": flashed and verified\n")
     assert (drive / "chainrig.uf2").read_bytes() == DRIVE.image_path.read_bytes()
 
 
@@ -97,19 +95,18 @@ def test_a_running_pico_is_asked_to_take_firmware(flash, tmp_path, monkeypatch):
     running(monkeypatch, mounts, wire.Done())
     with PtyBoard(**NAMES) as there:
         plug_in(monkeypatch, there.path, lambda: not mounts.read_text() or copy.exists())
-        code, out, err = flash()
-    assert code == 0, err
-    assert f"the Raspberry Pi Pico at {there.path} waits for firmware" in err
-    assert out.endswith(": flashed and verified\n")
+        done = flash()
+    assert f"the Raspberry Pi Pico at {there.path} waits for firmware" in done.err
+    assert done.out.endswith(": flashed and verified\n")
     assert copy.read_bytes() == DRIVE.image_path.read_bytes()
 
 
 @pytest.mark.parametrize(
     ("reason", "message"),
     [
-        (RefusalReason.HOLDING_A_DROP, "the device still holds the drop of run 7"),
-        (RefusalReason.BUSY, "the device is busy with a drop"),
-        (RefusalReason.UNKNOWN_MESSAGE, "hold its BOOTSEL button"),
+        (wire.RefusalReason.HOLDING_A_DROP, "the device still holds the drop of run 7"),
+        (wire.RefusalReason.BUSY, "the device is busy with a drop"),
+        (wire.RefusalReason.UNKNOWN_MESSAGE, "hold its BOOTSEL button"),
     ],
 )
 def test_a_running_pico_that_refuses_is_left_alone(flash, tmp_path, monkeypatch, reason, message):
@@ -117,9 +114,8 @@ def test_a_running_pico_that_refuses_is_left_alone(flash, tmp_path, monkeypatch,
     running(monkeypatch, tmp_path / "mounts", wire.Refused(reason, 7))
     with PtyBoard(**NAMES) as there:
         plug_in(monkeypatch, there.path)
-        code, out, err = flash()
-    assert (code, out) == (4, "")
-    assert message in err
+        done = flash(code=4)
+    assert message in done.err
 
 
 @pytest.mark.parametrize(
@@ -139,18 +135,16 @@ def test_what_keeps_a_pico_from_being_flashed_is_said(
     prepare(tmp_path)
     monkeypatch.setattr(drives, "_RESTART_S", 0.0)
     plug_in(monkeypatch, "", lambda: False)
-    code, out, err = flash()
-    assert (code, out) == (4, "")
-    assert [message for message in messages if message not in err] == []
+    done = flash(code=4)
+    assert [message for message in messages if message not in done.err] == []
     assert len(names) < 2 or not any((drive / "chainrig.uf2").exists() for drive in waiting)
 
 
-def test_the_ports_name_a_pico_that_nothing_has_mounted(tmp_path, monkeypatch, capsys):
+def test_the_ports_name_a_pico_that_nothing_has_mounted(tmp_path, monkeypatch, call):
     picos(tmp_path, monkeypatch)
     (tmp_path / "label").touch()
     monkeypatch.setattr("serial.tools.list_ports.comports", list)
-    assert main(["ports"]) == 0
-    assert "drive RPI-RP2 is not mounted: " in capsys.readouterr().err
+    assert "drive RPI-RP2 is not mounted: " in call("ports").err
 
 
 @pytest.mark.parametrize("port", [[], ["--port"]])
@@ -160,8 +154,7 @@ def test_a_port_that_udev_permits_a_little_later_is_waited_for(flash, tmp_path, 
     monkeypatch.setattr("os.access", lambda *_: next(refusals, True))
     with PtyBoard(**NAMES) as there:
         plugged(monkeypatch, there.path)
-        code, _, err = flash(*port, *([there.path] if port else []))
-    assert code == 0, err
+        flash(*port, *([there.path] if port else []))
     assert next(refusals, None) is None
 
 
@@ -172,22 +165,17 @@ def test_a_port_that_stays_forbidden_is_said(flash, tmp_path, monkeypatch):
     monkeypatch.setattr("os.access", lambda *_: False)
     monkeypatch.setattr(drives, "_RESTART_S", 0.2)
     plugged(monkeypatch, "/dev/ttyACM0")
-    code, _, err = flash()
-    assert code == 4
-    assert "dialout" in err
+    assert "dialout" in flash(code=4).err
 
 
 def test_what_is_no_such_drive_is_left_alone(flash, tmp_path):
-    code, _, err = flash("--drive", tmp_path)
-    assert code == 2
-    assert "is no drive of a Pico" in err
+    assert "is no drive of a Pico" in flash("--drive", tmp_path, code=2).err
     assert list(tmp_path.iterdir()) == []
 
 
 @cases
-def test_options_of_the_other_boards(capsys, arguments, message):
-    assert main(arguments) == 2
-    assert message in capsys.readouterr().err
+def test_options_of_the_other_boards(call, arguments, message):
+    assert message in call(*arguments, code=2).err
 
 
 def _with(at: int, value: bytes, size: int = 4):
@@ -208,12 +196,10 @@ def _with(at: int, value: bytes, size: int = 4):
 )
 def test_a_file_that_must_not_be_flashed(tmp_path, change, message):
     (file := tmp_path / "it.uf2").write_bytes(change(DRIVE.image_path.read_bytes()))
-    with pytest.raises(InputError, match=message):
-        read_image(file, DRIVE)
+    refused(InputError, message, read_image, file, DRIVE)
 
 
 def test_an_image_of_another_kind(tmp_path):
-    with pytest.raises(InputError):
-        read_image(TARGETS["mega"].image_path, DRIVE)
-    with pytest.raises(InputError, match="no whole record of an Intel HEX file"):
-        read_image(DRIVE.image_path, TARGETS["mega"])
+    mega = TARGETS["mega"]
+    refused(InputError, "", read_image, mega.image_path, DRIVE)
+    refused(InputError, "no whole record of an Intel HEX", read_image, DRIVE.image_path, mega)

@@ -1,9 +1,5 @@
 """rig flash with an avrdude that flashes nothing, and which files may be flashed on which board."""
 
-import os
-import pty
-from contextlib import contextmanager
-
 import pytest
 import serial
 
@@ -11,24 +7,14 @@ from rig import boards
 from rig.errors import InputError
 from rig.flash.boards import TARGETS
 from rig.flash.image import read_image
-from tests.flash.pty_board import PtyBoard
+from tests.flash.pty_board import PtyBoard, silent_port
+from tests.refusals import refused
 from tests.tables import cases
 
 VERSION = read_image(TARGETS["mega"].image_path, TARGETS["mega"]).firmware
 NAMES = {"board": "Arduino Mega 2560", "firmware": VERSION}
 PTY = "where nobody answers"
 OTHER = "is for an Arduino Uno, not for an Arduino Mega 2560"
-
-
-@contextmanager
-def silent_port():
-    """Open a port behind which nobody answers."""
-    ends = pty.openpty()
-    try:
-        yield os.ttyname(ends[1])
-    finally:
-        for end in ends:
-            os.close(end)
 
 
 def options(argv):
@@ -39,13 +25,12 @@ def options(argv):
 def test_a_board_is_flashed_and_asked(board, avrdude, flash):
     target = TARGETS[board]
     with PtyBoard(board=target.board.name, firmware=VERSION) as there:
-        code, out, err = flash("--port", there.path, board=board)
-    assert code == 0, err
-    assert out.startswith(f"{target.board.name}, {VERSION}, 16 gates, id ")
-    assert out.endswith(": flashed and verified\n")
-    assert out.count("\n") == 1
-    assert f"writing {VERSION} (" in err
-    assert "Writing | ######## | 100%" in err
+        done = flash("--port", there.path, board=board)
+    assert done.out.startswith(f"{target.board.name}, {VERSION}, 16 gates, id ")
+    assert done.out.endswith(": flashed and verified\n")
+    assert done.out.count("\n") == 1
+    assert f"writing {VERSION} (" in done.err
+    assert "Writing | ######## | 100%" in done.err
     argv = list(avrdude.argv)
     argv.remove("-D")
     assert options(argv) == {
@@ -62,8 +47,7 @@ def test_another_image_and_another_avrdude(avrdude, flash, tmp_path, monkeypatch
     hex_file.write_bytes(TARGETS["mega"].image_path.read_bytes())
     monkeypatch.setenv("PATH", str(tmp_path / "empty"))
     with PtyBoard(**NAMES) as there:
-        code, _, err = flash("--port", there.path, "--hex", hex_file, "--avrdude", avrdude.path)
-    assert code == 0, err
+        flash("--port", there.path, "--hex", hex_file, "--avrdude", avrdude.path)
     assert f"flash:w:{hex_file}:i" in avrdude.argv
 
 
@@ -72,10 +56,9 @@ def test_another_image_and_another_avrdude(avrdude, flash, tmp_path, monkeypatch
 def test_avrdude_fails(says, message, avrdude, flash):
     avrdude.will(says, 1)
     with silent_port() as path:
-        code, out, err = flash("--port", path)
-    assert (code, out) == (4, "")
+        done = flash("--port", path, code=4)
     for words in (says, f"flashing {path} failed: ", message, "hint: "):
-        assert words in err
+        assert words in done.err
 
 
 def broken_program(folder):
@@ -103,25 +86,22 @@ def test_nothing_is_flashed_where_something_is_wrong(
 ):
     with silent_port() as path:
         given = [path if word is PTY else word for word in arguments(tmp_path)]
-        result, _, err = flash(*given)
-    assert result == code
-    assert message in err
+        done = flash(*given, code=code)
+    assert message in done.err
     assert avrdude.argv is None
 
 
 def test_avrdude_is_missing(flash, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     with silent_port() as path:
-        code, _, err = flash("--port", path)
-    assert code == 2
-    assert "apt-get install avrdude" in err
+        done = flash("--port", path, code=2)
+    assert "apt-get install avrdude" in done.err
 
 
 def test_a_port_somebody_uses(avrdude, flash):
     with silent_port() as path, serial.Serial(path, exclusive=True):
-        code, _, err = flash("--port", path)
-    assert code == 4
-    assert "another program uses it" in err
+        done = flash("--port", path, code=4)
+    assert "another program uses it" in done.err
     assert avrdude.argv is None
 
 
@@ -130,19 +110,17 @@ def test_a_port_somebody_uses(avrdude, flash):
 )
 def test_the_board_says_something_else(names, avrdude, flash):
     with PtyBoard(**names) as there:
-        code, out, err = flash("--port", there.path)
-    assert (code, out) == (4, "")
-    assert f"answers as {names['board']}, {names['firmware']}" in err
+        done = flash("--port", there.path, code=4)
+    assert f"answers as {names['board']}, {names['firmware']}" in done.err
 
 
 def test_the_board_says_nothing(avrdude, flash, monkeypatch):
     monkeypatch.setattr("rig.link.client.LOADER_WAIT_S", 0.1)
     monkeypatch.setattr("rig.link.exchange._LONGEST_WAIT_S", 0.0)
     with silent_port() as path:
-        code, out, err = flash("--port", path)
-    assert (code, out) == (4, "")
-    assert "written; asking the board who it is" in err
-    assert "the device did not answer Identify" in err
+        done = flash("--port", path, code=4)
+    assert "written; asking the board who it is" in done.err
+    assert "the device did not answer Identify" in done.err
 
 
 UNO, MEGA = TARGETS["uno"], TARGETS["mega"]
@@ -203,8 +181,8 @@ def test_every_damaged_digit_is_found(file):
     line, end = image(*GOOD).splitlines()
     for n in range(1, len(line)):
         other = "0" if line[n] != "0" else "1"
-        with pytest.raises(InputError, match=r"it\.hex:1:1: "):
-            read_image(file(f"{line[:n]}{other}{line[n + 1 :]}\n{end}\n"), UNO)
+        damaged = file(f"{line[:n]}{other}{line[n + 1 :]}\n{end}\n")
+        refused(InputError, r"it\.hex:1:1: ", read_image, damaged, UNO)
 
 
 @pytest.mark.parametrize(
@@ -227,10 +205,8 @@ def test_every_damaged_digit_is_found(file):
     ],
 )
 def test_what_must_not_be_flashed(file, text, says):
-    with pytest.raises(InputError, match=says):
-        read_image(file(text), UNO)
+    refused(InputError, says, read_image, file(text), UNO)
 
 
 def test_a_file_that_is_not_there(tmp_path):
-    with pytest.raises(InputError, match="No such file"):
-        read_image(tmp_path / "none.hex", UNO)
+    refused(InputError, "No such file", read_image, tmp_path / "none.hex", UNO)

@@ -5,7 +5,6 @@ import re
 from hypothesis import strategies as st
 
 from rig.link import messages as wire
-from rig.link.messages import Chars, Raw, UnsignedInt
 
 WORD, LONG = st.integers(0, 2**16 - 1), st.integers(0, 2**32 - 1)
 
@@ -17,15 +16,15 @@ def name_in_c(kind: type) -> str:
 
 def values(field) -> st.SearchStrategy:
     match field.wire:
-        case UnsignedInt() if field.python is not int:
+        case wire.UnsignedInt() if field.python is not int:
             return st.sampled_from(list(field.python))
-        case UnsignedInt(size=size):
+        case wire.UnsignedInt(size=size):
             return st.integers(0, 2 ** (8 * size) - 1)
-        case Raw(size=size, tail=False):
+        case wire.Raw(size=size, tail=False):
             return st.binary(min_size=size, max_size=size)
-        case Chars(limit=limit):
+        case wire.Chars(limit=limit):
             return st.text(max_size=limit // 4)
-        case Raw():
+        case wire.Raw():
             events = st.lists(st.tuples(LONG, WORD), max_size=wire.EVENTS_PER_FRAME)
             return events.map(wire.pack_events)
     raise AssertionError(field)

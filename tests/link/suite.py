@@ -5,7 +5,6 @@ import pytest
 from rig.errors import DeviceError
 from rig.link import messages as wire
 from rig.link.client import Device
-from rig.link.messages import RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Incoming
 from rig.records import Drop
@@ -45,6 +44,12 @@ class Suite:
             pytest.skip("there is no hand at the emergency stop here")
         return bench
 
+    @pytest.fixture
+    def sensing(self, bench) -> Bench:
+        if not bench.can_sense:
+            pytest.skip("the release-sense input cannot be driven here")
+        return bench
+
     def drop(self, device: Device, label: int = LABEL, **changes: int) -> Drop:
         device.fire(arm(device, label, **changes))
         return device.collect(label)
@@ -67,7 +72,7 @@ class Suite:
         expected = seconds * identity.tick_hz
         assert abs(ticks - expected) <= bench.tick_tolerance + 0.005 * expected
 
-    def refused(self, reason: RefusalReason, call, *args, **kwargs) -> DeviceRefusedError:
+    def refused(self, reason: wire.RefusalReason, call, *args, **kwargs) -> DeviceRefusedError:
         with pytest.raises(DeviceRefusedError) as caught:
             call(*args, **kwargs)
         assert caught.value.reason is reason

@@ -3,7 +3,6 @@
 import pytest
 
 from rig.link import messages as wire
-from rig.link.messages import Phase, RefusalReason
 from rig.selftest.board import SelftestOptions
 from rig.selftest.findings import Verdict
 from rig.selftest.run import selftest
@@ -25,7 +24,7 @@ class DropSuite(Suite):
     def test_idle_state(self, bench, device):
         bench.touch(0x0201)
         state = device.status()
-        assert (state.phase, state.label, state.events) == (Phase.IDLE, 0, 0)
+        assert (state.phase, state.label, state.events) == (wire.Phase.IDLE, 0, 0)
         assert state.gates & GATES == 0x0201
 
     def test_a_drop_comes_whole_and_exact(self, bench, device, identity):
@@ -34,7 +33,7 @@ class DropSuite(Suite):
         assert (drop.run, drop.attempt) == (7, 1)
         assert bench.lab.drops == [LABEL]
         self.release(device, drop)
-        assert device.status().phase is Phase.IDLE
+        assert device.status().phase is wire.Phase.IDLE
 
     def test_only_armed_gates_are_recorded(self, bench):
         events, certificate = Wire(bench).drop(gates=0x0002)
@@ -76,21 +75,17 @@ class InputSuite(Suite):
         now = device.ping().tick
         assert (now - third.tick) % 2**32 < 0.2 * identity.tick_hz
 
-    def test_the_release_sense_is_timed(self, bench, device, identity):
-        if not bench.can_sense:
-            pytest.skip("the release-sense input cannot be driven here")
-        bench.sense(0.012)
+    def test_the_release_sense_is_timed(self, sensing, device, identity):
+        sensing.sense(0.012)
         drop = self.drop(device)
-        self.check(bench, drop, identity)
-        self.close(bench, identity, drop.certificate.release_sense, 0.012)
+        self.check(sensing, drop, identity)
+        self.close(sensing, identity, drop.certificate.release_sense, 0.012)
 
     def test_without_a_change_there_is_no_release_sense(self, device):
         assert self.drop(device).certificate.release_sense is None
 
-    def test_a_change_behind_the_recording_is_not_of_the_drop(self, bench, device):
-        if not bench.can_sense:
-            pytest.skip("the release-sense input cannot be driven here")
-        bench.sense(0.1)
+    def test_a_change_behind_the_recording_is_not_of_the_drop(self, sensing, device):
+        sensing.sense(0.1)
         assert self.drop(device, record_ms=50).certificate.release_sense is None
 
 
@@ -99,14 +94,14 @@ class RefusalSuite(Suite):
         token = arm(device)
         bench.touch(0x0102)
         bench.touch(0x0100)  # gate 1 has moved, which matters less
-        self.refused(RefusalReason.WRONG_TOKEN, device.fire, token ^ 1)
-        assert self.refused(RefusalReason.GATE_BLOCKED, device.fire, token).detail == 0x0100
+        self.refused(wire.RefusalReason.WRONG_TOKEN, device.fire, token ^ 1)
+        assert self.refused(wire.RefusalReason.GATE_BLOCKED, device.fire, token).detail == 0x0100
 
     def test_a_gate_that_moved_after_arming_forbids_fire(self, bench, device):
         token = arm(device)
         bench.touch(0x0802)
         bench.touch(0)
-        assert self.refused(RefusalReason.GATE_UNSTEADY, device.fire, token).detail == 0x0002
+        assert self.refused(wire.RefusalReason.GATE_UNSTEADY, device.fire, token).detail == 0x0002
         device.abort()
         device.fire(arm(device))
 

@@ -4,7 +4,6 @@ import pytest
 
 from rig.link import messages as wire
 from rig.link.client import Device
-from rig.link.messages import Phase, pack_label
 from rig.link.transcript import Transcript
 from rig.records import ClockSample, Drop, Edge
 from tests.link.bench import LABEL
@@ -18,7 +17,7 @@ class LineSuite(Suite):
         assert isinstance(line.ask(wire.Status(), 1), wire.State)
         assert isinstance(line.ask(wire.Ping(), 1), wire.Pong)
         armed = line.ask(order(), 1)
-        assert line.ask(wire.Status(), 2).phase is Phase.ARMED
+        assert line.ask(wire.Status(), 2).phase is wire.Phase.ARMED
         assert line.ask(order(), 1) != armed
 
     def test_lost_events_and_certificate_are_read_again(self, bench):
@@ -35,11 +34,11 @@ class LineSuite(Suite):
         device = Device(port, bench.clock(), tries=40)
         device.connect()
         for run in range(3):
-            drop = self.drop(device, pack_label(run, 1))
+            drop = self.drop(device, wire.pack_label(run, 1))
             self.check(bench, drop, device.transcript.identity)
             self.release(device, drop)
         assert device.transcript.rx.bad > 0
-        assert bench.lab.drops == [pack_label(run, 1) for run in range(3)]
+        assert bench.lab.drops == [wire.pack_label(run, 1) for run in range(3)]
 
     def test_the_recorded_bytes_give_the_same_records(self, bench):
         chunks, live = [], []

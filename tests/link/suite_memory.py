@@ -5,7 +5,6 @@ from itertools import pairwise
 import pytest
 
 from rig.link import messages as wire
-from rig.link.messages import RefusalReason
 from rig.reasons import make_reason
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
@@ -23,6 +22,14 @@ def record_ms(count: int) -> int:
 
 
 class MemorySuite(Suite):
+    @pytest.fixture
+    def more(self, bench, identity) -> int:
+        """Have a device that streams see 60 events more than it keeps; give their number."""
+        if not identity.streams:
+            pytest.skip("a device that keeps a drop whole")
+        bench.lab.changes = blinking(identity.capacity + 60)
+        return identity.capacity + 60
+
     def test_a_full_memory_is_counted(self, bench, device, identity):
         if identity.streams:
             pytest.skip("a device that streams does not keep a drop whole")
@@ -33,45 +40,33 @@ class MemorySuite(Suite):
         assert drop.certificate.overflows == 20
         assert drop.faults == (make_reason("edges_lost", lost=20),)
 
-    def test_a_streamed_drop_may_be_longer_than_the_memory(self, bench, device, identity):
-        if not identity.streams:
-            pytest.skip("a device that keeps a drop whole")
-        count = identity.capacity + 60
-        bench.lab.changes = blinking(count)
-        drop = self.drop(device, record_ms=record_ms(count))
+    def test_a_streamed_drop_may_be_longer_than_the_memory(self, bench, device, identity, more):
+        drop = self.drop(device, record_ms=record_ms(more))
         self.check(bench, drop, identity)
         late = self.reconnected(bench).fetch(LABEL)
         assert late.edges == drop.edges[-len(late.edges) :]
         assert "events_overwritten" in {fault.code for fault in late.faults}
 
-    def test_a_streaming_device_reads_out_what_it_keeps(self, bench, identity):
-        if not identity.streams:
-            pytest.skip("a device that keeps a drop whole")
-        count = identity.capacity + 60
-        bench.lab.changes = blinking(count)
+    def test_a_streaming_device_reads_out_what_it_keeps(self, bench, more):
         line = Wire(bench)
-        events, certificate = line.drop(record_ms=record_ms(count))
-        assert len(events) == certificate.events == count
+        events, certificate = line.drop(record_ms=record_ms(more))
+        assert len(events) == certificate.events == more
         for seq, first in enumerate([0, 59], start=1):
             assert line.ask(wire.Read(LABEL, first, 1), seq) == wire.Refused(
-                RefusalReason.NOT_KEPT, 60
+                wire.RefusalReason.NOT_KEPT, 60
             )
-        for seq, first in enumerate([60, count - 1], start=3):
+        for seq, first in enumerate([60, more - 1], start=3):
             assert line.ask(wire.Read(LABEL, first, 1), seq).snapshots == (events[first],)
         assert line.ask(wire.Read(LABEL, 0, 0), 5) == certificate
         assert line.ask(wire.Acknowledge(LABEL, certificate.crc32), 6) == wire.Done()
 
-    def test_events_that_nobody_has_any_more_are_a_fault(self, bench, identity):
-        if not identity.streams:
-            pytest.skip("a device that keeps a drop whole")
-        count = identity.capacity + 60
-        bench.lab.changes = blinking(count)
+    def test_events_that_nobody_has_any_more_are_a_fault(self, bench, identity, more):
         port = LossyPort(bench)
         device = self.reconnected(bench, port)
-        device.fire(arm(device, record_ms=record_ms(count)))
-        port.lose_rx_until_ns = bench.clock().now_ns() + (record_ms(count) + 20) * 1_000_000
+        device.fire(arm(device, record_ms=record_ms(more)))
+        port.lose_rx_until_ns = bench.clock().now_ns() + (record_ms(more) + 20) * 1_000_000
         drop = device.collect(LABEL)
-        overwritten = make_reason("events_overwritten", missing=60, events=count, first=0)
+        overwritten = make_reason("events_overwritten", missing=60, events=more, first=0)
         assert drop.faults == (overwritten,)
         assert len(drop.edges) == identity.capacity - 1  # behind the gap one change is in doubt
         self.release(device, drop)

@@ -4,7 +4,6 @@ import pytest
 
 from rig.link import messages as wire
 from rig.link.frames import Frame, encode
-from rig.link.messages import DisarmReason, Phase, RefusalReason
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
 from tests.link.talk import Wire, arm
@@ -17,7 +16,7 @@ class OutputSuite(Suite):
         seen = [watched.outputs()]
         token = arm(device, **LONG)
         seen.append(watched.outputs())
-        self.refused(RefusalReason.WRONG_TOKEN, device.fire, token ^ 1)
+        self.refused(wire.RefusalReason.WRONG_TOKEN, device.fire, token ^ 1)
         seen.append(watched.outputs())
         device.fire(token)
         seen.append(watched.outputs())
@@ -89,31 +88,34 @@ class OutputSuite(Suite):
         for _ in range(4):
             watched.clock().sleep(0.05)
             assert watched.outputs() == 0
-        assert device.status().phase is Phase.IDLE
+        assert device.status().phase is wire.Phase.IDLE
 
 
 class SilenceSuite(Suite):
-    @pytest.mark.parametrize("request_", [wire.Status(), wire.Ping(), wire.Fire(0), wire.Done()])
-    def test_any_request_every_100_ms_keeps_it_armed(self, bench, request_):
+    @pytest.fixture
+    def armed(self, bench) -> tuple[Wire, int]:
+        """Have a device armed for 5 s; give the line to it and the token."""
         line = Wire(bench)
-        token = line.ask(wire.Arm(LABEL, 1, 0, 0, 5000, 50), 1).token
+        return line, line.ask(wire.Arm(LABEL, 1, 0, 0, 5000, 50), 1).token
+
+    @pytest.mark.parametrize("request_", [wire.Status(), wire.Ping(), wire.Fire(0), wire.Done()])
+    def test_any_request_every_100_ms_keeps_it_armed(self, bench, armed, request_):
+        line, token = armed
         for seq in range(2, 7):
             bench.clock().sleep(0.07)
             line.ask(request_, seq)
         assert isinstance(line.ask(wire.Fire(token), 8), wire.Fired)
 
-    def test_a_repeated_request_keeps_it_armed_too(self, bench):
-        line = Wire(bench)
-        token = line.ask(wire.Arm(LABEL, 1, 0, 0, 5000, 50), 1).token
+    def test_a_repeated_request_keeps_it_armed_too(self, bench, armed):
+        line, token = armed
         for _ in range(5):
             bench.clock().sleep(0.07)
             line.ask(wire.Status(), 2)
         assert isinstance(line.ask(wire.Fire(token), 3), wire.Fired)
 
     @pytest.mark.parametrize("frame", ["bad CRC", "seq 0"])
-    def test_what_is_no_request_is_silence(self, bench, frame):
-        line = Wire(bench)
-        line.ask(wire.Arm(LABEL, 1, 0, 0, 5000, 50), 1)
+    def test_what_is_no_request_is_silence(self, bench, armed, frame):
+        line, _ = armed
         junk = encode(Frame(0x03, 0 if frame == "seq 0" else 5, 0, b""))
         if frame == "bad CRC":
             junk = junk[:1] + bytes([junk[1] ^ 4]) + junk[2:]
@@ -121,18 +123,18 @@ class SilenceSuite(Suite):
         for _ in range(5):
             bench.port().write(junk)
             heard += line.hear(0.08)
-        assert heard == [(0, wire.Disarmed(LABEL, DisarmReason.HOST_SILENT))]
+        assert heard == [(0, wire.Disarmed(LABEL, wire.DisarmReason.HOST_SILENT))]
 
 
 class StopSuite(Suite):
     def test_an_open_stop_forbids_arming(self, stoppable, device):
         stoppable.stop(True)
         stoppable.clock().sleep(1e-3)  # it acts within that
-        assert "emergency stop" in self.refused(RefusalReason.STOPPED, arm, device).message
-        self.refused(RefusalReason.STOPPED, arm, device, release=0, pulse_us=0)
-        self.refused(RefusalReason.BAD_PARAMETER, arm, device, gates=0)
+        assert "emergency stop" in self.refused(wire.RefusalReason.STOPPED, arm, device).message
+        self.refused(wire.RefusalReason.STOPPED, arm, device, release=0, pulse_us=0)
+        self.refused(wire.RefusalReason.BAD_PARAMETER, arm, device, gates=0)
         stoppable.lab.hanging = 1
-        self.refused(RefusalReason.STOPPED, arm, device)
+        self.refused(wire.RefusalReason.STOPPED, arm, device)
         stoppable.lab.hanging = 0
         stoppable.stop(False)
         stoppable.clock().sleep(1e-3)
@@ -142,11 +144,11 @@ class StopSuite(Suite):
         token = arm(device)
         stoppable.stop(True)
         heard = self.heard(stoppable, device, 0.05)
-        assert heard == [wire.Disarmed(LABEL, DisarmReason.STOPPED)]
-        error = self.refused(RefusalReason.NOT_ARMED, device.fire, token)
+        assert heard == [wire.Disarmed(LABEL, wire.DisarmReason.STOPPED)]
+        error = self.refused(wire.RefusalReason.NOT_ARMED, device.fire, token)
         assert "emergency stop was opened" in error.message
         stoppable.stop(False)
-        self.refused(RefusalReason.NOT_ARMED, device.fire, token)
+        self.refused(wire.RefusalReason.NOT_ARMED, device.fire, token)
         assert stoppable.lab.drops == []
 
     def test_opening_it_in_a_drop_switches_off_and_records_on(
@@ -158,7 +160,7 @@ class StopSuite(Suite):
         stoppable.stop(True)
         watched.clock().sleep(0.001)
         assert watched.outputs() == 0
-        assert device.status().phase is Phase.RECORDING
+        assert device.status().phase is wire.Phase.RECORDING
         stoppable.stop(False)
         watched.clock().sleep(0.001)
         assert watched.outputs() == 0
@@ -189,24 +191,24 @@ class StopSuite(Suite):
     def test_a_drop_is_read_while_it_is_open(self, stoppable, device):
         drop = self.drop(device)
         stoppable.stop(True)
-        assert device.status().phase is Phase.HOLDING
+        assert device.status().phase is wire.Phase.HOLDING
         self.release(device, drop)
 
     def test_a_reset_does_not_close_it(self, stoppable, device):
         stoppable.stop(True)
         self.restart(stoppable, device)
-        self.refused(RefusalReason.STOPPED, arm, device)
+        self.refused(wire.RefusalReason.STOPPED, arm, device)
 
 
 class CoolingSuite(Suite):
     def test_a_release_rests_for_three_pulses(self, bench, device):
         self.release(device, self.drop(device, pulse_us=50_000, record_ms=60))
         bench.lab.hanging = 1
-        error = self.refused(RefusalReason.COOLING, arm, device)
+        error = self.refused(wire.RefusalReason.COOLING, arm, device)
         assert 80 < error.detail <= 141
         assert f"{error.detail} ms" in error.message
         bench.clock().sleep(0.03)
-        assert self.refused(RefusalReason.COOLING, arm, device).detail <= error.detail - 29
+        assert self.refused(wire.RefusalReason.COOLING, arm, device).detail <= error.detail - 29
         bench.lab.hanging = 0
         arm(device, release=0, pulse_us=0)  # what needs no release need not wait
         device.abort()
@@ -218,16 +220,16 @@ class CoolingSuite(Suite):
         bench.clock().sleep(0.04)
         device.abort()
         self.release(device, device.collect(LABEL))
-        assert 10 < self.refused(RefusalReason.COOLING, arm, device).detail < 180
+        assert 10 < self.refused(wire.RefusalReason.COOLING, arm, device).detail < 180
 
     def test_an_open_stop_comes_before_cooling(self, stoppable, device):
         self.release(device, self.drop(device, pulse_us=50_000, record_ms=60))
         stoppable.stop(True)
         stoppable.clock().sleep(1e-3)  # it acts within that
-        self.refused(RefusalReason.STOPPED, arm, device)
+        self.refused(wire.RefusalReason.STOPPED, arm, device)
         stoppable.stop(False)
         stoppable.clock().sleep(1e-3)
-        self.refused(RefusalReason.COOLING, arm, device)
+        self.refused(wire.RefusalReason.COOLING, arm, device)
 
 
 class SafetySuite(OutputSuite, SilenceSuite, StopSuite, CoolingSuite):

@@ -2,9 +2,12 @@
 
 import random
 
+import serial
+
 from rig.link import messages as wire
 from rig.link.client import BOOT_WAIT_S, Device
 from rig.link.frames import Decoder, Frame, encode
+from rig.link.port import open_port, port_clock
 from tests.link.bench import GATES, LABEL, Bench
 
 ORDER = {"gates": GATES, "release": 1, "pulse_us": 20_000, "timeout_ms": 5000, "record_ms": 150}
@@ -16,6 +19,14 @@ def arm(device: Device, label: int = LABEL, **changes: int) -> int:
 
 def order(**changes: int) -> wire.Arm:
     return wire.Arm(**({"label": LABEL} | ORDER | changes))
+
+
+def connected(where: str, *tap, **options) -> tuple[serial.SerialBase, Device]:
+    """Open a port, and connect to the device that is there."""
+    port = open_port(where)
+    device = Device(port, port_clock(port), *tap)
+    device.connect(**options)
+    return port, device
 
 
 class NoisyPort:

@@ -1,6 +1,5 @@
 """What client and port do when a device, a line or an address misbehaves."""
 
-import os
 import socket
 import sys
 from dataclasses import replace
@@ -24,10 +23,11 @@ from rig.reasons import make_reason
 from rig.records import ClockSample
 from sim.clock import VirtualClock
 from tests.daemon.far_port import FarPort
-from tests.flash.pty_board import PtyBoard
+from tests.flash.pty_board import PtyBoard, silent_port
 from tests.link.bench import LABEL, ScriptedLab, falling_rods
 from tests.link.strategies import MESSAGES
-from tests.link.talk import arm
+from tests.link.talk import arm, connected
+from tests.refusals import refused
 from tests.tables import cases
 from tests.waiting import until
 
@@ -118,17 +118,15 @@ def test_who_never_answers_is_asked_a_few_times_whatever_patience_a_bad_line_nee
 ):
     """Each time: at first, behind what a boot loader is told, and when it should have let go."""
     port = FakePort(clock, {})
-    with pytest.raises(DeviceTimeoutError, match="did not answer Identify") as caught:
-        Device(port, clock, tries=tries).connect()
-    assert "cable" in caught.value.hint
+    one = Device(port, clock, tries=tries)
+    assert "cable" in refused(DeviceTimeoutError, "did not answer Identify", one.connect).hint
     frames = [frame for data in port.written for frame in Decoder().feed(data)]
     assert [frame.type for frame in frames] == [wire.CODES[wire.Identify]] * 3 * asked
 
 
 def test_repeats_have_the_same_seq_and_back_off(clock):
     port = FakePort(clock, {})
-    with pytest.raises(DeviceTimeoutError, match="did not answer Ping"):
-        Device(port, clock, tries=6).ping()
+    refused(DeviceTimeoutError, "did not answer Ping", Device(port, clock, tries=6).ping)
     assert len(port.written) == 6
     assert len(set(port.written)) == 1
     assert 1.5 < clock.now_ns() * 1e-9 < 3
@@ -179,8 +177,8 @@ def test_seq_wraps_around_zero(clock):
 
 
 def test_nonsense_is_said_to_be_nonsense(clock):
-    with pytest.raises(DeviceError, match="answered Status with Pong"):
-        device(clock, {wire.Status: [wire.Pong(1)]}).status()
+    confused = device(clock, {wire.Status: [wire.Pong(1)]})
+    refused(DeviceError, "answered Status with Pong", confused.status)
 
 
 @pytest.mark.parametrize("ask", [Device.status, Device.receive, Device.statistics])
@@ -191,9 +189,8 @@ def test_a_broken_cable_is_a_lost_connection(clock, monkeypatch, ask):
     port = FakePort(clock, {wire.Status: None})
     if ask is not Device.status:
         monkeypatch.setattr(FakePort, "in_waiting", property(closed))
-    with pytest.raises(DeviceError, match="connection lost") as caught:
-        ask(Device(port, clock))
-    assert not isinstance(caught.value, DeviceTimeoutError)
+    error = refused(DeviceError, "connection lost", ask, Device(port, clock))
+    assert not isinstance(error, DeviceTimeoutError)
 
 
 def test_the_tap_comes_before_everything(clock):
@@ -236,8 +233,7 @@ def test_events_that_do_not_match_the_certificate_are_a_fault(clock):
 
 
 def test_a_device_that_never_gives_the_events_is_faulty(clock):
-    with pytest.raises(DeviceError, match="did not send the events"):
-        Device(Liar(clock, 5), clock).fetch(1)
+    refused(DeviceError, "did not send the events", Device(Liar(clock, 5), clock).fetch, 1)
 
 
 class Forgetful(FakePort):
@@ -274,9 +270,8 @@ def test_a_device_that_refuses_even_what_it_says_it_keeps_is_not_asked_for_ever(
         def refusal(self):
             return wire.Refused(wire.RefusalReason.NOT_KEPT, 0)
 
-    with pytest.raises(DeviceRefusedError) as caught:
-        Device(Denier(clock, {}), clock).fetch(1)
-    assert caught.value.reason is wire.RefusalReason.NOT_KEPT
+    error = refused(DeviceRefusedError, "", Device(Denier(clock, {}), clock).fetch, 1)
+    assert error.reason is wire.RefusalReason.NOT_KEPT
 
 
 def test_what_a_streaming_device_no_longer_keeps_is_not_forgotten_by_the_host(clock):
@@ -305,20 +300,17 @@ def test_a_device_that_disarmed_itself_has_a_reason(clock, reason):
     )
     one = Device(port, clock)
     token = one.arm(wire.Arm(1, 1, 0, 0, 1, 1))
-    with pytest.raises(DeviceRefusedError, match="disarmed itself") as caught:
-        one.fire(token)
-    assert caught.value.disarmed is reason
-    assert "arm again" in caught.value.hint
+    error = refused(DeviceRefusedError, "disarmed itself", one.fire, token)
+    assert error.disarmed is reason
+    assert "arm again" in error.hint
     port.answers[wire.Arm] = [wire.Armed(10)]
     token = one.arm(wire.Arm(1, 1, 0, 0, 1, 1))
-    with pytest.raises(DeviceRefusedError, match="is not armed"):
-        one.fire(token)
+    refused(DeviceRefusedError, "is not armed", one.fire, token)
 
 
 def test_a_recording_without_end_is_a_time_out(clock):
     port = FakePort(clock, {wire.Status: [wire.State(wire.Phase.RECORDING, 0, 1, 3)]})
-    with pytest.raises(DeviceTimeoutError, match="never ends"):
-        Device(port, clock).collect(1, timeout=10)
+    refused(DeviceTimeoutError, "never ends", Device(port, clock).collect, 1, timeout=10)
     assert clock.now_ns() * 1e-9 == pytest.approx(LONGEST_RECORD_MS * 1e-3 + 10, abs=0.5)
     each_s = LONGEST_RECORD_MS * 1e-3 / len(port.written)
     assert 0.25 <= each_s < 0.4, "it is asked now and then, and not all the time"
@@ -447,15 +439,10 @@ def test_a_real_port_has_the_computer_s_clock():
 
 
 def test_a_port_belongs_to_one_program():
-    controller, line = os.openpty()
-    try:
-        first = open_port(os.ttyname(line))
-        with pytest.raises(DeviceError, match="another program uses it"):
-            open_port(os.ttyname(line))
+    with silent_port() as path:
+        first = open_port(path)
+        refused(DeviceError, "another program uses it", open_port, path)
         first.close()
-    finally:
-        os.close(controller)
-        os.close(line)
 
 
 @cases
@@ -470,16 +457,9 @@ def bridge():
         yield bridge
 
 
-def connected(url, tap=lambda *_: None):
-    port = open_port(url)
-    device = Device(port, port_clock(port), tap)
-    device.connect(boot_wait_s=0.5)
-    return port, device
-
-
 def test_a_drop_comes_whole_over_tcp_and_outlives_a_reconnect(bridge):
     chunks = []
-    port, device = connected(bridge.url, lambda *chunk: chunks.append(chunk))
+    port, device = connected(bridge.url, lambda *chunk: chunks.append(chunk), boot_wait_s=0.5)
     device.fire(arm(device))
     drop = device.collect(LABEL)
     port.close()
@@ -487,16 +467,15 @@ def test_a_drop_comes_whole_over_tcp_and_outlives_a_reconnect(bridge):
     assert len(drop.edges) == len(falling_rods())
     received = [data for direction, _, data in chunks if direction == "rx"]
     assert sum(map(len, received)) / len(received) > 8  # not byte by byte
-    port, again = connected(bridge.url)
+    port, again = connected(bridge.url, boot_wait_s=0.5)
     assert again.fetch(LABEL) == drop
     port.close()
 
 
 def test_a_connection_that_ends_is_said(bridge):
-    port, device = connected(bridge.url)
+    port, device = connected(bridge.url, boot_wait_s=0.5)
     bridge.hang_up()
-    with pytest.raises(DeviceError, match=r"the port is gone|reset by peer|Broken pipe"):
-        device.status()
+    refused(DeviceError, r"the port is gone|reset by peer|Broken pipe", device.status)
     port.close()
 
 
@@ -526,14 +505,11 @@ def test_nothing_listens():
 
 @pytest.mark.parametrize("url", ["socket://lab", "socket://127.0.0.1:99999", "socket://"])
 def test_what_is_no_address(url):
-    with pytest.raises(DeviceError, match=f"cannot open {url}: ") as caught:
-        open_port(url)
-    assert "HOST:PORT" in caught.value.hint
+    assert "HOST:PORT" in refused(DeviceError, f"cannot open {url}: ", open_port, url).hint
 
 
 def test_a_missing_emulator_says_how_to_get_it(monkeypatch):
     monkeypatch.setitem(sys.modules, "rig_emulator", None)  # importing it now fails
-    with pytest.raises(DeviceError, match="emulator is not installed") as caught:
-        open_port("emu://?protocol=x.yaml")
-    assert "./firmware/emulator" in caught.value.hint
-    assert "libsimavr-dev" in caught.value.hint
+    error = refused(DeviceError, "emulator is not installed", open_port, "emu://?protocol=x.yaml")
+    assert "./firmware/emulator" in error.hint
+    assert "libsimavr-dev" in error.hint

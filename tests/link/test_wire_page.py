@@ -9,7 +9,6 @@ from typing import NamedTuple
 from rig.link import frames
 from rig.link import messages as wire
 from rig.link.frames import Frame, encode
-from rig.link.messages import Chars, Raw, UnsignedInt, pack_events
 from rig.link.port import BAUDRATE
 from tests.link.strategies import name_in_c
 
@@ -55,13 +54,13 @@ def expected_rows(kind: type) -> list[list[str]]:
     for field in wire.FIELDS[kind]:
         size = None
         match field.wire:
-            case UnsignedInt(size=size):
+            case wire.UnsignedInt(size=size):
                 name = f"u{8 * size}"
-            case Raw(size=size, tail=False):
+            case wire.Raw(size=size, tail=False):
                 name = f"{size} bytes"
-            case Chars(limit=limit):
+            case wire.Chars(limit=limit):
                 name = f"text ≤ {limit}"
-            case Raw(size=record):
+            case wire.Raw(size=record):
                 name = f"{record} bytes each"
         found.append(["" if at is None else str(at), field.name, name])
         at = None if at is None or size is None else at + size
@@ -140,8 +139,8 @@ def spoken(told: str) -> wire.Message:
             value = field.python[keyword.value.id]
         else:
             value = ast.literal_eval(keyword.value)
-            if isinstance(field.wire, Raw):
-                value = pack_events(value) if field.wire.tail else bytes.fromhex(value)
+            if isinstance(field.wire, wire.Raw):
+                value = wire.pack_events(value) if field.wire.tail else bytes.fromhex(value)
         values[keyword.arg] = value
     return kind(**values)
 
@@ -205,12 +204,12 @@ def places_of(kind: type) -> Iterator[tuple[str, int]]:
         if fixed:
             yield key, at
         match field.wire:
-            case Chars(limit=limit):
+            case wire.Chars(limit=limit):
                 yield f"{key}_LIMIT", limit
                 fixed = False
-            case Raw(size=size, tail=True):
+            case wire.Raw(size=size, tail=True):
                 yield f"{name}_RECORD", size
                 fixed = False
-            case UnsignedInt(size=size) | Raw(size=size):
+            case wire.UnsignedInt(size=size) | wire.Raw(size=size):
                 at += size
     yield f"{name}_SIZE", at

@@ -6,6 +6,7 @@ import pytest
 
 from rig.errors import InputError
 from rig.protocol.reader import parse
+from tests.refusals import refused
 from tests.tables import cases, protocol_text
 
 SCENE = protocol_text("five-rods")
@@ -20,9 +21,7 @@ def chains(a, b="like: A"):
 
 
 def problems(a, b="like: A"):
-    with pytest.raises(InputError) as caught:
-        parse(scene(a, b), "f")
-    return [str(problem) for problem in caught.value.problems]
+    return [str(one) for one in refused(InputError, "", parse, scene(a, b), "f").problems]
 
 
 def test_masses_rod_by_rod():
@@ -88,12 +87,8 @@ def test_each_fault_of_a_chain_is_found_at_its_place(a, start):
 
 
 def test_one_object_has_no_profile():
-    with pytest.raises(InputError) as caught:
-        parse(
-            "protocol: 1\nchains: {A: {rods: 1, masses: {exponential: {bottom: 2 g, top: 1 g}}}}",
-            "f",
-        )
-    (problem,) = caught.value.problems
+    text = "protocol: 1\nchains: {A: {rods: 1, masses: {exponential: {bottom: 2 g, top: 1 g}}}}"
+    (problem,) = refused(InputError, "", parse, text, "f").problems
     assert str(problem).startswith("f:2:32: chains.A.masses.exponential: one object has one mass")
 
 

@@ -14,15 +14,9 @@ from rig.boards import BOARDS, GATES, LONGEST_RECORD_MS
 from rig.cli import main
 from rig.errors import InputError
 from rig.model.fall import free_leg
+from rig.protocol import measurable
 from rig.protocol.describe import describe
 from rig.protocol.keys import MOST_RODS, SECTIONS
-from rig.protocol.measurable import (
-    LEAST_RECORD_MS,
-    check_measurable,
-    check_recordable,
-    longest_fall,
-    record_ms,
-)
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Priors, Run
 from rig.protocol.reader import parse, read
@@ -30,6 +24,7 @@ from rig.protocol.site import gravity_at
 from rig.protocol.yamltree import load, place_of
 from tests.analysis.drops import FENCE, UNIFORM, case
 from tests.protocol.test_protocol_reader import GOOD
+from tests.refusals import refused
 from tests.tables import cases, protocol_text
 
 TWO = protocol_text("two-chains")
@@ -105,9 +100,7 @@ def test_every_prior_has_a_key_and_what_is_left_out_is_as_by_default():
 
 @cases
 def test_what_is_no_prior_is_refused_at_its_place(text, said):
-    with pytest.raises(InputError) as caught:
-        scene(text)
-    (problem,) = caught.value.problems
+    (problem,) = refused(InputError, "", scene, text).problems
     assert problem.line == len(UNIFORM.text.splitlines()) + 2
     assert said in str(problem)
 
@@ -152,19 +145,19 @@ def test_a_recording_outlasts_the_fall(text):
     past_the_gate, down = (
         free_leg(chain.length + way, 0.0, gravity)[1] for way in (drop - 0.02, drop)
     )
-    assert LEAST_RECORD_MS / 1e3 < past_the_gate < longest_fall(protocol)
-    assert down + protocol.release.pulse < record_ms(protocol) / 1e3 < 3.0
+    assert measurable.LEAST_RECORD_MS / 1e3 < past_the_gate < measurable.longest_fall(protocol)
+    assert down + protocol.release.pulse < measurable.record_ms(protocol) / 1e3 < 3.0
 
 
 def test_a_fall_that_no_board_can_record_is_refused_beforehand():
     protocol = parse(ENDLESS, "f")
-    assert record_ms(protocol) > LONGEST_RECORD_MS
+    assert measurable.record_ms(protocol) > LONGEST_RECORD_MS
     with pytest.raises(InputError, match=r"f:7:7: drop: from here .* at most 65.535 s"):
-        check_recordable(protocol)
-    check_measurable(protocol)  # what another timer recorded is not refused
+        measurable.check_recordable(protocol)
+    measurable.check_measurable(protocol)  # what another timer recorded is not refused
     note = "note: cannot be recorded: f:7:7: drop: from here a drop takes up to 63.6 s"
     assert note in describe(protocol)
-    check_recordable(parse(LONG))
+    measurable.check_recordable(parse(LONG))
 
 
 def up_to(limit, board):
@@ -196,7 +189,7 @@ def test_all_judge_alike_what_a_board_can_do(word, limit, tmp_path, capsys):
         assert (word in listed.split(", ")) == able
         assert (f"note: board {word} is not suitable: {path}:" in said) != able
         if able:
-            check_recordable(protocol, board)
+            measurable.check_recordable(protocol, board)
         else:
             assert main(["check", str(path), "--board", word]) == 2
             assert f"the board ({board.name}) has " in capsys.readouterr().err

@@ -10,13 +10,13 @@ from pathlib import Path
 
 import pytest
 
-from rig.cli import main
 from rig.errors import SessionError
 from rig.recover.drops import Fate
 from rig.recover.examine import describe, examine
 from rig.recover.save import save
 from rig.replay import replay
 from rig.session.store import Session
+from tests.session.altering import alter
 
 ROOT = Path(__file__).parents[2]
 
@@ -39,18 +39,6 @@ def content(path):
         }
 
 
-def alter(path, *statements):
-    """Alter a session behind its back; nothing of what was there is left in a free page."""
-    with closing(sqlite3.connect(path)) as connection:
-        for table in ("edge", "drop", "meta", "protocol", "identity"):
-            for verb in ("delete", "update"):
-                connection.execute(f"DROP TRIGGER {table}_no_{verb}")
-        for statement in statements:
-            connection.execute(statement)
-        connection.commit()
-        connection.execute("VACUUM")
-
-
 @pytest.fixture(scope="module")
 def truth(fences):
     return content(fences)
@@ -67,10 +55,9 @@ def saved(path, folder, **options):
     return content(new), missing
 
 
-def test_a_sound_session_is_whole_and_stays_as_it_is(copy, truth, tmp_path, capsys):
+def test_a_sound_session_is_whole_and_stays_as_it_is(copy, truth, tmp_path, call):
     before = copy.read_bytes()
-    assert main(["recover", str(copy)]) == 0
-    lines = capsys.readouterr().out.splitlines()
+    lines = call("recover", copy).out.splitlines()
     assert lines[-1] == "everything is whole"
     assert sum(line.endswith(str(Fate.CONFIRMED)) for line in lines) == len(truth["drops"])
     assert copy.read_bytes() == before
@@ -163,6 +150,7 @@ from rig.link.messages import Status
 from rig.records import Drop, Edge
 from rig.session.schema import RunState
 from rig.session.store import Session
+from tests.session.altering import alter
 session = Session.create(sys.argv[1], "protocol: 1", "p.yaml", simulated=False, origin="x")
 for run in range(1, 30):
     edges = tuple(Edge(1000 * n, n % 3, n % 2 == 0) for n in range(50))
@@ -276,12 +264,12 @@ def database(path):
         (lambda path: path.write_bytes(b"SQLite format 3\0"), "nothing of a session"),
     ],
 )
-def test_what_is_no_session(make, says, tmp_path, capsys):
+def test_what_is_no_session(make, says, tmp_path, call):
     path = tmp_path / "thing"
     make(path)
-    assert main(["recover", str(path)]) == 2
-    assert f"not a session: {says}" in capsys.readouterr().out or says in str(examine(path).foreign)
-    assert main(["recover", str(path), "-o", str(tmp_path / "new")]) == 2
+    done = call("recover", path, code=2)
+    assert f"not a session: {says}" in done.out or says in str(examine(path).foreign)
+    call("recover", path, "-o", tmp_path / "new", code=2)
     assert not (tmp_path / "new").exists()
 
 

@@ -1,7 +1,5 @@
 """Figures are plain data; drawn, they are whole, the same each time, and hide nothing."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

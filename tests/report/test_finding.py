@@ -1,7 +1,5 @@
 """What a session found, in sentences; how it departed from its plan; what each gate saw."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from types import SimpleNamespace
@@ -156,11 +154,7 @@ def test_each_void_has_a_remedy_and_the_general_one_only_where_nothing_else_is_k
 def test_void_drops_of_one_reason_share_a_line_above_what_to_do():
     last = void(2, 1, SKEW, MISSED), void(3, 2, verdict="accepted"), void(4, 1, MOTHS)
     lines = void_lines(Analysis(last, (void(3, 1, SKEW),), ()))
-    assert lines[1:4] == [
-        f"  runs 2, 3: {SKEW}",
-        f"  run 2: {MISSED}",
-        "  run 4: moths",
-    ]
+    assert lines[1:4] == [f"  runs 2, 3: {SKEW}", f"  run 2: {MISSED}", "  run 4: moths"]
     worse = make_reason("release_skew", skew_s=20e-3, limit_s=5e-3)
     again = void_lines(Analysis((void(2, 2, worse),), (void(2, 1, SKEW),), ()))
     assert again[1] == "  run 2 (attempts 1–2): release skew"

@@ -1,7 +1,5 @@
 """The page: whole, self-contained, and no text of a file becomes part of it."""
 
-from __future__ import annotations
-
 import base64
 import re
 from collections import defaultdict

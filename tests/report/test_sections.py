@@ -1,7 +1,5 @@
 """Sections of a page or a text fail alone, and say so."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from unittest.mock import Mock
 

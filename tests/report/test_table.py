@@ -1,7 +1,5 @@
 """Tables in the terminal and on the page, and the digits of numbers."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """The live analysis says what the whole one does; a better measurement brings what was promised."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 

@@ -11,9 +11,8 @@ from rig.errors import InputError, SessionError
 from rig.protocol import reader
 from rig.results.together import SessionPart, results_together, same_owners
 from rig.session.store import Session
-from tests.cli.conftest import call  # noqa: F401 - a fixture
 from tests.cli.lab import PROTOCOLS, record
-from tests.session.altering import unguarded
+from tests.session.altering import alter
 from tests.tables import cases
 
 
@@ -40,7 +39,7 @@ def together(*paths, **options):
             file.close()
 
 
-def test_runs_of_both_count_in_one_mean_and_keep_their_sessions_names(two, call):  # noqa: F811
+def test_runs_of_both_count_in_one_mean_and_keep_their_sessions_names(two, call):
     said = json.loads(call("analyze", *two, "--json").out)
     assert [run["session"] for run in said["runs"]] == ["a.session"] * 4 + ["b.session"] * 4
     (line,) = said["summary"]
@@ -51,9 +50,9 @@ def test_runs_of_both_count_in_one_mean_and_keep_their_sessions_names(two, call)
     assert said["learned"]["runs"] == 8
 
 
-def test_nothing_that_is_kept_is_used_where_that_is_asked_for(two, call, monkeypatch):  # noqa: F811
+def test_nothing_that_is_kept_is_used_where_that_is_asked_for(two, call, monkeypatch):
     monkeypatch.setattr("rig.cache.store.CacheFolder.get", None)
-    assert call("compare", *two, "--fresh").code == 0
+    call("compare", *two, "--fresh")
 
 
 def test_what_one_rig_shares_is_one_unknown_and_of_two_rigs_there_are_two(two):
@@ -118,12 +117,11 @@ def test_a_session_and_its_copy_are_one(two, tmp_path):
     refused("session_repeated", InputError, two[0], copy)
 
 
-def test_a_blind_session_is_refused(two, tmp_path, call):  # noqa: F811
+def test_a_blind_session_is_refused(two, tmp_path, call):
     blind = record_few(tmp_path, "blind", change=("protocol: 1\n", "protocol: 1\nblind: true\n"))
     refused("session_blind", SessionError, two[1], blind)
     for command in ("compare", "analyze"):
-        done = call(command, two[1], blind, "--json")
-        assert (done.code, done.out) == (2, "")
+        assert call(command, two[1], blind, "--json", code=2).out == ""
 
 
 def test_an_unfinished_session_is_refused_unless_it_is_asked_for(two, tmp_path):
@@ -140,15 +138,13 @@ def test_an_unfinished_session_is_refused_unless_it_is_asked_for(two, tmp_path):
 
 def test_a_damaged_session_is_refused(two, tmp_path):
     copy = shutil.copy(two[0], tmp_path / "copy.session")
-    with unguarded(copy) as connection:
-        connection.execute('UPDATE "drop" SET crc32 = crc32 + 1 WHERE id = 2')
+    alter(copy, 'UPDATE "drop" SET crc32 = crc32 + 1 WHERE id = 2')
     refused("records_damaged", InputError, two[1], copy)
 
 
 @cases
-def test_options_for_another_number_of_sessions_are_refused(two, call, sessions, options):  # noqa: F811
-    done = call("analyze", *two[:sessions], *options)
-    assert done.code == 2
+def test_options_for_another_number_of_sessions_are_refused(two, call, sessions, options):
+    done = call("analyze", *two[:sessions], *options, code=2)
     assert options[0].replace("--no-", "--") in done.err
 
 

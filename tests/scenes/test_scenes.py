@@ -1,7 +1,6 @@
 """Any scene, any command: it ends, says what is true, and leaves out what is not there."""
 
 import math
-from pathlib import Path
 
 import pytest
 
@@ -12,7 +11,7 @@ from sim.dials import Dials
 from tests.analysis.drops import case
 from tests.analysis.sessions import analysis
 from tests.scenes.draw import Scene, scene
-from tests.scenes.through import faults
+from tests.scenes.through import Journey
 
 pytestmark = pytest.mark.usefixtures("analysed_once")
 SOME = (0, 2, 13, 20, 39, 46, 57, 62, 67, 93, 107, 128, 204, 218, 223)
@@ -20,20 +19,15 @@ SOME = (0, 2, 13, 20, 39, 46, 57, 62, 67, 93, 107, 128, 204, 218, 223)
 MANY = 240
 
 
-def _assert_sound(drawn: Scene, folder: Path) -> None:
-    found = faults(drawn, folder)
-    assert not found, "\n".join([drawn.port, drawn.text, *found])
-
-
 @pytest.mark.parametrize("seed", SOME)
-def test_a_scene_goes_through_every_command(seed, tmp_path):
-    _assert_sound(scene(seed), tmp_path)
+def test_a_scene_goes_through_every_command(seed, call, tmp_path):
+    Journey(call, scene(seed), tmp_path).go()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [seed for seed in range(MANY) if seed not in SOME])
-def test_many_more_scenes_go_through_every_command(seed, tmp_path):
-    _assert_sound(scene(seed, drops=12), tmp_path)
+def test_many_more_scenes_go_through_every_command(seed, call, tmp_path):
+    Journey(call, scene(seed, drops=12), tmp_path).go()
 
 
 PRIORS = SECTIONS["priors"]
@@ -112,10 +106,9 @@ def test_some_things_known_exactly_leave_a_drop_sound(kind, zeros):
 @pytest.mark.parametrize(
     "kind", ["two", *(pytest.param(kind, marks=SLOW) for kind in ("air", "fence", "glider"))]
 )
-def test_all_known_exactly_goes_through_every_command(kind, tmp_path):
+def test_all_known_exactly_goes_through_every_command(kind, call, tmp_path):
     text = protocol(kind, ALL)
-    scene = Scene(1, text, "sim://?quiet=1", parse(text, "zeros.yaml"))
-    assert not faults(scene, tmp_path)
+    Journey(call, Scene(1, text, "sim://?quiet=1", parse(text, "zeros.yaml")), tmp_path).go()
     found = rig.open(tmp_path / "scene.session").analyze().runs
     assert_sound(found)
     for measured in found[0].quantities.values():

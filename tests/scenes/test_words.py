@@ -13,7 +13,6 @@ from bench import pictures
 from bench.pictures import FakeClient, screenshots, seen
 from rig import __version__
 from rig.campaign.machine import Flow, Stage
-from rig.cli import main
 from rig.protocol.reader import read
 from rig.ready import ready_protocol
 from rig.recorder.controller import Controller
@@ -87,16 +86,15 @@ def text_of_svg(path: Path) -> str:
 @pytest.mark.parametrize(
     ("scene", "board"), [*zip(SCENES, cycle(["pico", "mega", "uno"]), strict=False)]
 )
-def test_a_draft_and_its_drawings_speak_the_words_of_their_scene(scene, board, tmp_path, capsys):
+def test_a_draft_and_its_drawings_speak_the_words_of_their_scene(scene, board, tmp_path, call):
     file = tmp_path / "mine.yaml"
-    assert main(["new", str(file), "--scene", scene, "--board", board, "--yes"]) in {0, 3}
-    out, err = capsys.readouterr()
+    done = call("new", file, "--scene", scene, "--board", board, "--yes", code={0, 3})
     drawings = {path.name: text_of_svg(path) for path in tmp_path.glob("*.svg")}
     assert set(drawings) == {"mine-mounting.svg", "mine-wiring.svg"}
     assert "gate 0" in drawings["mine-wiring.svg"]
     assert "At each beam: channel: height in mm." in drawings["mine-mounting.svg"]
-    out = re.sub(r"\nLeft out\n.*?\n\n", "\n\n", out, flags=re.DOTALL)
-    texts = {"draft": file.read_text("utf-8"), "plan": out, "questions": err, **drawings}
+    plan = re.sub(r"\nLeft out\n.*?\n\n", "\n\n", done.out, flags=re.DOTALL)
+    texts = {"draft": file.read_text("utf-8"), "plan": plan, "questions": done.err, **drawings}
     for where, text in texts.items():
         assert_own_words(SCENES[scene], where, re.sub(NAMES, "", text))
 

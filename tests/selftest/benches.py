@@ -2,7 +2,6 @@
 
 from rig.link import messages as wire
 from rig.link.client import Device
-from rig.link.messages import pack_label
 from rig.selftest.board import SelftestOptions
 from rig.selftest.findings import Verdict
 from rig.selftest.run import selftest
@@ -60,7 +59,7 @@ def fire_drop(port, run, *tap):
     device = Device(port, port.clock, *tap)
     device.connect()
     order = {"gates": 1 << GATE, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
-    order["label"] = pack_label(run, 2)
+    order["label"] = wire.pack_label(run, 2)
     device.fire(device.arm(wire.Arm(**order)))
     return device, order
 

@@ -2,15 +2,15 @@
 
 import json
 from dataclasses import replace
+from functools import partial
+from unittest.mock import Mock
 
 import pytest
 
-from rig.cli import main
 from rig.errors import DeviceError
 from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.frames import Frame, encode
-from rig.link.messages import Phase, RefusalReason
 from rig.selftest.board import SelftestOptions
 from rig.selftest.checks import BAD_ORDERS
 from rig.selftest.findings import Verdict
@@ -26,13 +26,8 @@ FENCE = "sim://?protocol=protocols/picket-fence.yaml"
 
 
 @pytest.fixture
-def rig(capsys):
-    def call(*arguments):
-        code = main(["selftest", *arguments])
-        out, err = capsys.readouterr()
-        return code, out.splitlines(), err
-
-    return call
+def rig(call):
+    return partial(call, "selftest")
 
 
 def failed(found):
@@ -111,9 +106,8 @@ def test_a_gate_in_use_that_is_blocked_or_not_there_fails(
 
 
 def test_json_lists_each_check_with_its_codes(rig):
-    code, lines, _ = rig("--port", FENCE, "--loopback", "2", "--drops", "1", "--json")
-    assert code == 4
-    listed = {entry.pop("name"): entry for entry in json.loads("\n".join(lines))["checks"]}
+    done = rig("--port", FENCE, "--loopback", "2", "--drops", "1", "--json", code=4)
+    listed = {entry.pop("name"): entry for entry in json.loads(done.out)["checks"]}
     assert list(listed) == list(CHECKS)
     assert listed["bad requests"] == {"verdict": "ok", "what": "", "advice": "", "reason_codes": []}
     codes = {name: (entry["verdict"], entry["reason_codes"]) for name, entry in listed.items()}
@@ -125,21 +119,18 @@ def test_json_lists_each_check_with_its_codes(rig):
 
 @pytest.mark.parametrize("port", [FENCE, "sim://", "sim://?seed=3"])
 def test_a_protocol_says_which_gates_are_in_use(rig, port):
-    code, lines, _ = rig("--port", port, "--protocol", "protocols/picket-fence.yaml")
-    assert code == 0
+    lines = rig("--port", port, "--protocol", "protocols/picket-fence.yaml").out.splitlines()
     assert any(line.startswith("gates: ok: ") and "gates clear" in line for line in lines)
 
 
 @pytest.mark.parametrize("gates", ["", "0,", "0,16", "a"])
 def test_gates_are_a_list_of_numbers(rig, gates):
-    with pytest.raises(SystemExit, match="2"):
-        rig("--port", FENCE, "--gates", gates)
+    rig("--port", FENCE, "--gates", gates, code=2)
 
 
 def test_behind_a_terminal_in_real_time(rig):
     with PtyBoard() as there:
-        code, lines, _ = rig("--port", there.path)
-    assert code == 0, lines
+        rig("--port", there.path)
 
 
 def test_a_drop_of_a_session_is_left_alone(monkeypatch):
@@ -163,7 +154,7 @@ def test_a_drop_that_an_earlier_test_left_is_cleared_away():
     port = port_of(LoopedBoard(Wire()))
     device, *_ = hold_drop(port, wire.TEST_RUN)
     assert failed(outcomes(port)) == []
-    assert device.status().phase is Phase.IDLE
+    assert device.status().phase is wire.Phase.IDLE
 
 
 ONLY_HANDS = {"GATE_UNSTEADY", "STOPPED", "NOT_KEPT"}
@@ -198,7 +189,7 @@ def test_each_bad_order_that_is_accepted_is_found_out(name, value, monkeypatch):
             # Only the very variant: another bad order may share its one value.
             usual = order.pulse_us in {0, 50_000} or name == "pulse_us"
             lax = getattr(order, name) == value and usual and order.release
-            if answer == wire.Refused(RefusalReason.BAD_PARAMETER, 0) and (
+            if answer == wire.Refused(wire.RefusalReason.BAD_PARAMETER, 0) and (
                 lax or name == "release"
             ):
                 return wire.Armed(1) if getattr(order, name) == value else answer
@@ -264,10 +255,7 @@ def test_a_cable_that_is_pulled_is_said(monkeypatch):
     tests = selftest(port, SelftestOptions())
     next(tests)
 
-    def gone(*_):
-        raise OSError("device disconnected")
-
-    monkeypatch.setattr(port, "read", gone)
+    monkeypatch.setattr(port, "read", Mock(side_effect=OSError("device disconnected")))
     assert {finding.what for finding in tests if finding.failed} == {
         "connection lost: device disconnected"
     }

@@ -53,14 +53,15 @@ def pair():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Device.connect, "__defaults__", (0.0,))  # opening restarts none of them
         patch.setattr("rig.selftest.run.CHECKS", dict(islice(CHECKS.items(), 1)))
-        patch.setattr("rig.selftest.judge._LONG_US", 100_000)  # a release rests three times as long
+        # A release rests three times as long as it was on.
+        patch.setattr("rig.selftest.judge._LONG_US", 40_000)
+        patch.setattr("rig.selftest.judge._PULSES_US", (100, 1_000, 20_000, 40_000))
         yield Pair()
 
 
 @pytest.fixture
 def late(pair, monkeypatch):
-    """Have one comparator slower than the others, and both clocks compared in less time."""
-    monkeypatch.setattr("rig.selftest.judge._LONG_US", 40_000)
+    """Have one comparator slower than the others."""
     edge = pair.board.avr.edge
 
     def by(late_ns):
@@ -76,7 +77,7 @@ def test_a_right_board_is_measured_as_the_emulator_itself_measures_it(pair):
     found = {finding.name: finding for finding in pair.findings()}
     assert {str(f) for f in found.values() if f.verdict is not Verdict.OK} == set()
     (ppm,) = map(float, re.findall(r"clock (\S+) ppm", found["stamps"].what))
-    assert ppm == pytest.approx(PPM[0] - PPM[1], abs=0.4)  # two ticks in 0.1 s
+    assert ppm == pytest.approx(PPM[0] - PPM[1], abs=1.0)  # two ticks in 40 ms
     table = (FIRMWARE.parent / "docs" / "results" / "boards.md").read_text("utf-8")
     ((_, sd),) = re.findall(r"stamp, standard deviation \| (\d+) ns \| (\d+) ns", table)
     scatter, worst, skew = map(int, re.findall(r"(\d+) ns", found["stamps"].what))

@@ -3,6 +3,15 @@
 import sqlite3
 from contextlib import closing, contextmanager
 
+from rig.session.schema import TABLES
+
+LATER = {  # columns and tables that formats after the first have added
+    2: ["release_sense"],
+    3: ["reference", "host_break"],
+    4: ["pulse_ticks", "pulse_end", "restarts", "supply_mv", "lowest_mv"],
+    5: ["attachment", "hash"],
+}
+
 
 @contextmanager
 def unguarded(session):
@@ -15,3 +24,23 @@ def unguarded(session):
         yield connection
         for _, again in guards:
             connection.execute(again)
+
+
+def alter(session, *statements):
+    """Alter raw records; nothing of what was there is left in a free page."""
+    with unguarded(session) as connection:
+        for statement in statements:
+            connection.execute(statement)
+    with closing(sqlite3.connect(session)) as connection:
+        connection.execute("VACUUM")
+
+
+def outdate(session, version):
+    """Make a session one of an older format, as its program wrote it."""
+    with closing(sqlite3.connect(session)) as connection:
+        for name in (name for since, names in LATER.items() if since > version for name in names):
+            table = name in TABLES
+            sql = f"DROP TABLE {name}" if table else f'ALTER TABLE "drop" DROP COLUMN {name}'
+            connection.execute(sql)
+        connection.execute(f"PRAGMA user_version = {version}")
+        connection.execute("VACUUM")

@@ -1,11 +1,13 @@
 """Atomic writes: the old file or the new one."""
 
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from rig.errors import InputError
 from rig.files import write_atomic
+from tests.refusals import refused
 
 
 def test_replaces_and_leaves_nothing_else(tmp_path: Path) -> None:
@@ -37,19 +39,13 @@ def test_a_failed_write_leaves_the_old_file(
     path = tmp_path / "report.html"
     path.write_text("old")
 
-    def full(_handle: int) -> None:
-        raise OSError(28, "No space left on device")
-
+    full = Mock(side_effect=OSError(28, "No space left on device"))
     monkeypatch.setattr("rig.files.os.fsync", full)
-    with pytest.raises(InputError, match="No space left") as caught:
-        write_atomic(path, "new")
-    assert caught.value.hint
+    assert refused(InputError, "No space left", write_atomic, path, "new").hint
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
 
 
 def test_places_that_cannot_be_written(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="it is a folder"):
-        write_atomic(tmp_path, "x")
-    with pytest.raises(InputError, match="No such file"):
-        write_atomic(tmp_path / "no" / "file", "x")
+    refused(InputError, "it is a folder", write_atomic, tmp_path, "x")
+    refused(InputError, "No such file", write_atomic, tmp_path / "no" / "file", "x")

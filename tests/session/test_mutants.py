@@ -15,7 +15,6 @@ from bench.mutants import (
     read_text_with,
     read_through,
 )
-from rig.cli import main
 from rig.errors import SessionError
 from rig.protocol import reader
 from rig.records import Certificate, Drop, Edge
@@ -23,6 +22,7 @@ from rig.recover.examine import describe, examine
 from rig.session import foreign
 from rig.session.schema import RunState, read_reasons
 from rig.session.store import Session
+from tests.refusals import refused
 from tests.session.altering import unguarded
 from tests.tables import cases
 
@@ -78,7 +78,7 @@ def test_any_protocol_is_read_or_refused(tmp_path):
 
 
 @cases
-def test_a_file_of_another_build_is_refused_before_a_row_is_read(sql, sound, tmp_path, capsys):
+def test_a_file_of_another_build_is_refused_before_a_row_is_read(sql, sound, tmp_path, call):
     path = tmp_path / "altered"
     path.write_bytes(sound.read_bytes())
     with closing(sqlite3.connect(path)) as connection:
@@ -86,8 +86,7 @@ def test_a_file_of_another_build_is_refused_before_a_row_is_read(sql, sound, tmp
     for readonly in (True, False):
         with pytest.raises(SessionError, match="built or altered by another program"):
             Session.open(path, readonly=readonly)
-    assert main(["recover", str(path)]) == SessionError.exit_code
-    assert "rig cannot read it" in capsys.readouterr().out
+    assert "rig cannot read it" in call("recover", path, code=SessionError.exit_code).out
 
 
 @cases
@@ -97,8 +96,7 @@ def test_a_value_of_the_wrong_form_is_refused(sql, what, sound, tmp_path):
     with unguarded(path) as connection:
         connection.execute("PRAGMA ignore_check_constraints = ON")
         connection.execute(sql)
-    with pytest.raises(SessionError, match=what):
-        read_through(path)
+    refused(SessionError, what, read_through, path)
 
 
 def test_what_somebodys_analyze_leaves_is_no_harm(sound, tmp_path):
@@ -112,8 +110,7 @@ def test_what_somebodys_analyze_leaves_is_no_harm(sound, tmp_path):
 def test_a_statement_that_runs_away_is_ended(sound, monkeypatch):
     monkeypatch.setattr(foreign, "_MOST_STEPS", 10)
     monkeypatch.setattr(foreign, "_STEPS", 10)
-    with pytest.raises(SessionError, match="far longer to read than any session"):
-        read_through(sound)
+    refused(SessionError, "far longer to read than any session", read_through, sound)
 
 
 def test_more_edges_than_the_certificate_allows_are_not_read(sound, tmp_path):
@@ -127,8 +124,7 @@ def test_more_edges_than_the_certificate_allows_are_not_read(sound, tmp_path):
             "WITH RECURSIVE n(i) AS (SELECT 1000 UNION ALL SELECT i + 1 FROM n WHERE i < 3000) "
             "INSERT INTO edge SELECT 1, i, i, 0, 1 FROM n;"
         )
-    with pytest.raises(SessionError, match="run 1, attempt 1: it has more than"):
-        read_through(path)
+    refused(SessionError, "run 1, attempt 1: it has more than", read_through, path)
 
 
 HZ = 16_000_000
@@ -143,7 +139,7 @@ COUNT = 200
 
 
 @pytest.mark.parametrize("ticks", TICKS.values(), ids=TICKS)
-def test_edges_that_cannot_be_are_kept_and_void(ticks, tmp_path, capsys):
+def test_edges_that_cannot_be_are_kept_and_void(ticks, tmp_path, call):
     edges = tuple(Edge(ticks(n), n % 2, n // 2 % 2 == 0) for n in range(COUNT))
     session = make_session(tmp_path)
     with Session.open(session) as opened:
@@ -151,9 +147,7 @@ def test_edges_that_cannot_be_are_kept_and_void(ticks, tmp_path, capsys):
         account = Certificate(COUNT + 1, crc32=1, glitches=1)
         opened.add_drop(Drop(1, 2, HZ, edges, 5, 0, account), provenance="device")
         opened.add_state(1, 2, RunState.RECORDED, 10**12)
-    capsys.readouterr()
-    assert main(["analyze", "--json", str(session)]) == 3
-    (run,) = json.loads(capsys.readouterr().out)["runs"]
+    (run,) = json.loads(call("analyze", "--json", session, code=3).out)["runs"]
     assert run["verdict"] == "void"
     assert run["reasons"]
     with Session.open(session, readonly=True) as opened:

@@ -1,7 +1,5 @@
 """The session keeps what it is given, in order, and lets nobody alter it unnoticed."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import sqlite3
@@ -22,7 +20,8 @@ from rig.recover.save import save
 from rig.session.hashes import protocol_first
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, TABLES, RunState
 from rig.session.store import Session
-from tests.session.altering import unguarded
+from tests.refusals import refused
+from tests.session.altering import LATER, alter, outdate
 from tests.tables import cases
 
 TEXT = "protocol: 1\ntitle: Übung\n"
@@ -118,30 +117,17 @@ def test_everything_comes_back_as_it_went_in(path):
     assert [entry.name for entry in path.parent.iterdir()] == [path.name]
 
 
-LATER = {  # columns and tables that formats after the first have added
-    2: ["release_sense"],
-    3: ["reference", "host_break"],
-    4: ["pulse_ticks", "pulse_end", "restarts", "supply_mv", "lowest_mv"],
-    5: ["attachment", "hash"],
-}
-
-
-def make_older(path, version):
-    """Make a session, filled, one of an older format, as its program wrote it."""
+@pytest.fixture
+def filled(path):
     with make(path) as session:
         fill(session)
-    with closing(sqlite3.connect(path)) as connection:
-        for name in (name for since, names in LATER.items() if since > version for name in names):
-            table = name in TABLES
-            sql = f"DROP TABLE {name}" if table else f'ALTER TABLE "drop" DROP COLUMN {name}'
-            connection.execute(sql)
-        connection.execute(f"PRAGMA user_version = {version}")
-        connection.execute("VACUUM")
+    return path
 
 
 @pytest.mark.parametrize("version", range(1, SCHEMA_VERSION))
-def test_a_file_of_an_older_format_is_read_and_continued(path, version):
-    make_older(path, version)
+def test_a_file_of_an_older_format_is_read_and_continued(filled, version):
+    path = filled
+    outdate(path, version)
     lost = [name for since in (2, 4) if since > version for name in LATER[since]]
     account = replace(DEVICE_DROP.certificate, **dict.fromkeys(lost))
     without = replace(DEVICE_DROP, certificate=account)
@@ -176,35 +162,28 @@ def test_latest_drops_are_the_last_attempts(path):
 
 @pytest.mark.parametrize("table", TABLES)
 @cases
-def test_raw_records_are_never_altered(path, table, statement):
-    with make(path) as session:
-        fill(session)
-    refuse(path, statement.format(table=f'"{table}"', column=f'"{TABLES[table].names()[-1]}"'))
+def test_raw_records_are_never_altered(filled, table, statement):
+    refuse(filled, statement.format(table=f'"{table}"', column=f'"{TABLES[table].names()[-1]}"'))
 
 
-def test_a_drop_is_not_replaced_under_another_number(path):
-    with make(path) as session:
-        fill(session)
+def test_a_drop_is_not_replaced_under_another_number(filled):
     columns = ", ".join(TABLES["drop"].names()[1:])
-    refuse(path, f'INSERT OR REPLACE INTO "drop" SELECT id + 100, {columns} FROM "drop"')
+    refuse(filled, f'INSERT OR REPLACE INTO "drop" SELECT id + 100, {columns} FROM "drop"')
 
 
 def refuse(path, statement):
     with closing(sqlite3.connect(path)) as connection:
         before = list(connection.iterdump())
-        with pytest.raises(sqlite3.IntegrityError, match="never altered"):
-            connection.execute(statement)
+        refused(sqlite3.IntegrityError, "never altered", connection.execute, statement)
         assert list(connection.iterdump()) == before
 
 
 def test_a_refused_record_leaves_the_others(path):
     with make(path) as session:
         session.add_drop(DEVICE_DROP)
-        with pytest.raises(SessionError, match="never altered"):
-            session.add_drop(DEVICE_DROP)
+        refused(SessionError, "never altered", session.add_drop, DEVICE_DROP)
         half_bad = Drop(run=7, attempt=1, tick_hz=1, edges=(Edge(1, 1, True), Edge(2**70, 1, True)))
-        with pytest.raises(SessionError, match="refuses"):
-            session.add_drop(half_bad)
+        refused(SessionError, "refuses", session.add_drop, half_bad)
         session.add_drop(IMPORTED)
         session.commit()
     with Session.open(path, readonly=True) as session:
@@ -216,9 +195,8 @@ def fill_disk(session):
     connection = session.connection
     (pages,) = connection.execute("PRAGMA page_count").fetchone()
     connection.execute(f"PRAGMA max_page_count = {pages}")
-    with pytest.raises(SessionError, match="disk is full") as caught:
-        session.log_bytes("rx", 1, bytes(100_000))
-    assert "free some space" in caught.value.hint
+    error = refused(SessionError, "disk is full", session.log_bytes, "rx", 1, bytes(100_000))
+    assert "free some space" in error.hint
     return connection
 
 
@@ -230,8 +208,7 @@ def test_a_full_disk_costs_nothing_once_there_is_room(path):
         session.log_bytes("rx", 2, b"kept in memory")
         session.add_drop(DEVICE_DROP)
         session.add_drop(IMPORTED)
-        with pytest.raises(SessionError, match="disk is full"):
-            session.commit()
+        refused(SessionError, "disk is full", session.commit)
         assert session.pending == 4
         connection.execute("PRAGMA max_page_count = 100000")
     with Session.open(path) as session:
@@ -247,8 +224,7 @@ def test_a_record_that_waits_for_the_disk_and_is_refused_then_is_told_of(path):
         session.add_drop(DEVICE_DROP)  # which is there
         session.add_drop(IMPORTED)
         connection.execute("PRAGMA max_page_count = 100000")
-        with pytest.raises(SessionError, match="never altered"):
-            session.commit()
+        refused(SessionError, "never altered", session.commit)
     with Session.open(path) as session:
         assert list(session.drops()) == [DEVICE_DROP, IMPORTED]
 
@@ -259,10 +235,8 @@ def test_readers_beside_a_writer_see_what_is_committed(path):
         assert list(reader.byte_log()) == []
         writer.commit()
         assert len(list(reader.byte_log())) == 1
-        with pytest.raises(SessionError, match="read-only"):
-            reader.log_bytes("rx", 1, b"x")
-        with pytest.raises(SessionError, match="read-only"):
-            reader.commit()
+        refused(SessionError, "read-only", reader.log_bytes, "rx", 1, b"x")
+        refused(SessionError, "read-only", reader.commit)
 
 
 def test_a_snapshot_does_not_move_while_another_writes(path):
@@ -297,10 +271,8 @@ def test_closed_session_says_so(path):
     session = make(path)
     session.close()
     session.close()
-    with pytest.raises(SessionError, match="closed"):
-        session.pings()
-    with pytest.raises(SessionError, match="closed"):
-        session.commit()
+    refused(SessionError, "closed", session.pings)
+    refused(SessionError, "closed", session.commit)
 
 
 def test_an_error_in_the_block_keeps_what_was_measured(path):
@@ -325,9 +297,7 @@ for count in range(10**9):
     with killed(code, path) as child:
         for _ in range(200):
             last = int(child.stdout.readline())
-        with pytest.raises(SessionError, match=f"written by process {child.pid}") as caught:
-            Session.open(path)
-        assert caught.value.hint
+        assert refused(SessionError, f"written by process {child.pid}", Session.open, path).hint
         child.kill()
         last = max([last, *map(int, child.stdout.read().split("\n")[:-1])])
     with Session.open(path) as session:
@@ -349,10 +319,8 @@ def test_sigkill_before_the_commit_leaves_a_whole_session(path):
 
 def test_one_writer_even_within_a_process(path):
     with make(path):
-        with pytest.raises(SessionError, match="being written"):
-            Session.open(path)
-        with pytest.raises(SessionError, match="being written"):
-            make(path)
+        refused(SessionError, "being written", Session.open, path)
+        refused(SessionError, "being written", make, path)
     Session.open(path).close()
 
 
@@ -364,14 +332,12 @@ def test_a_leftover_lock_file_blocks_nobody(path):
 
 def test_create_never_overwrites(path):
     path.write_text("precious")
-    with pytest.raises(SessionError, match="already exists"):
-        make(path)
+    refused(SessionError, "already exists", make, path)
     assert path.read_text() == "precious"
 
 
 def test_create_in_a_missing_folder(tmp_path):
-    with pytest.raises(SessionError, match="No such file"):
-        make(tmp_path / "no" / "such.rig")
+    refused(SessionError, "No such file", make, tmp_path / "no" / "such.rig")
 
 
 def database(path, *sql):
@@ -382,12 +348,11 @@ def database(path, *sql):
 
 
 def altered(sql):
-    def alter(path):
+    def make_altered(path):
         make(path).close()
-        with unguarded(path) as connection:
-            connection.execute(sql)
+        alter(path, sql)
 
-    return alter
+    return make_altered
 
 
 def hollow(path):
@@ -418,10 +383,9 @@ NO_SESSIONS = {
 def test_what_is_no_session(path, prepare, words: str, readonly: bool):
     prepare(path)
     before = path.read_bytes() if path.is_file() else None
-    with pytest.raises(SessionError, match=words) as caught:
-        Session.open(path, readonly=readonly)
-    assert caught.value.hint
-    assert caught.value.exit_code == 2
+    error = refused(SessionError, words, Session.open, path, readonly=readonly)
+    assert error.hint
+    assert error.exit_code == 2
     assert (path.read_bytes() if path.is_file() else None) == before
     assert not path.with_name(path.name + ".lock").exists()
 
@@ -465,25 +429,20 @@ def test_what_is_as_recorded_has_no_fault(sound, tmp_path):
 def test_what_is_not_as_recorded_is_named(sql, fault, sound, tmp_path):
     path = tmp_path / "altered"
     shutil.copy(sound, path)
-    with unguarded(path) as connection:
-        if "7 - id" in sql:
-            connection.execute("UPDATE ping SET id = -id WHERE id IN (3, 4)")
-            sql = "UPDATE ping SET id = 7 + id WHERE id < 0"
-        connection.execute(sql)
+    alter(path, *sql.split("; "))
     damage = examine(path).damage
     assert any(line.startswith("table " + fault) for line in damage), damage
 
 
-def test_an_old_file_has_no_chain_and_a_continued_one_says_since_when(tmp_path):
-    path = tmp_path / "old"
-    make_older(path, 4)
+def test_an_old_file_has_no_chain_and_a_continued_one_says_since_when(filled):
+    path = filled
+    outdate(path, 4)
     before = path.read_bytes()
     assert (faults(path), first(path), path.read_bytes()) == ([], None, before)
     with Session.open(path) as session:
         record(session, 7)
     assert (faults(path), first(path)) == ([], None)
-    with unguarded(path) as connection:
-        connection.execute("UPDATE ping SET tick = 1 WHERE id = 1")
+    alter(path, "UPDATE ping SET tick = 1 WHERE id = 1")
     assert faults(path) != [], "its older rows are hashed from then on"
 
 

@@ -1,7 +1,5 @@
 """What a protocol states of the physics reaches both simulated worlds, or is refused there."""
 
-from __future__ import annotations
-
 import copy
 from dataclasses import asdict
 from functools import cache

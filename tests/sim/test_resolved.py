@@ -26,6 +26,7 @@ from sim.resolved.motion import push
 from sim.resolved.scene import Board, Bounce, Chain, Fall, Rods, Strings
 from sim.resolved_lab import ResolvedLab, at_level
 from sim.scene import set_scene
+from tests.refusals import refused
 from tests.tables import protocol_text
 
 pytestmark = pytest.mark.usefixtures("loops_compiled")
@@ -313,13 +314,10 @@ def test_a_fall_that_would_take_minutes_is_refused_and_a_long_one_told_of(
         small = small.replace(was, now)
     path = tmp_path / "threads.yaml"
     path.write_text(small)
-    with pytest.raises(InputError, match="of 4 rods would take") as caught:
-        asked(str(path))
-    assert "numba" in caught.value.hint
+    assert "numba" in refused(InputError, "of 4 rods would take", asked, str(path)).hint
 
 
 def test_a_top_rod_that_never_lands_is_said(dropped):
     lab, _, _ = dropped
     struck = replace(fall(lab.chains(pack_label(1, 1))["impact"]), touched_s=np.full(4, np.inf))
-    with pytest.raises(InputError, match="strikes nothing"):
-        at_level(struck, GRAVITY)
+    refused(InputError, "strikes nothing", at_level, struck, GRAVITY)

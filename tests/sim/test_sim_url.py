@@ -7,11 +7,10 @@ from urllib.parse import quote
 
 import pytest
 
-from rig.link.client import Device
 from rig.link.messages import Arm, pack_label
-from rig.link.port import open_port, port_clock
 from rig.records import ClockSample, Drop
 from sim.line import BadLine
+from tests.link.talk import connected
 from tests.sim.falls import PROTOCOLS
 
 FENCE = PROTOCOLS / "picket-fence.yaml"
@@ -33,12 +32,10 @@ class Talk:
 
 
 def talk(where: str, gates: int = 0b11, runs=((1, 1),), pings: int = 3) -> Talk:
-    port = open_port(where)
-    clock, done = port_clock(port), Talk()
-    device = Device(port, clock, lambda *chunk: done.chunks.append(chunk))
-    device.connect()
+    done = Talk()
+    port, device = connected(where, lambda *chunk: done.chunks.append(chunk))
     for i in range(pings):
-        clock.sleep(0.1 + 0.037 * (i % 7))
+        port.clock.sleep(0.1 + 0.037 * (i % 7))
         ping = device.ping()
         if ping is not None:
             done.pings.append(ping)

@@ -2,23 +2,15 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 
-from rig.cli import main
+from tests.programs import Done
 from tests.tables import protocol_text
 
 SCENE = protocol_text("few-rods")
 VARY = ("restitution=-1..1:5", "inertia=0.00025..0.05:6", "friction=0..1:6")
 """With the scene's inclines: points on the pile, not sliding, with α above ½ and without one."""
-
-
-class Done(NamedTuple):
-    """How a call ended."""
-
-    code: int
-    err: str
 
 
 @pytest.fixture
@@ -29,15 +21,13 @@ def scene(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def sweep(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Callable[..., Done]:
-    """Sweep the scene (or another) into a file of the temporary folder."""
+def sweep(scene: Path, tmp_path: Path, call: Callable[..., Done]) -> Callable[..., str]:
+    """Sweep the scene into a file of the temporary folder; give what is said of that."""
 
-    def call(output: str, *vary: str, protocol: Path = scene, more: tuple[str, ...] = ()) -> Done:
-        arguments = [str(protocol), "-o", str(tmp_path / output), *more]
-        arguments += [part for text in vary for part in ("--vary", text)]
-        code = main(["sweep", *arguments])
-        out, err = capsys.readouterr()
-        assert out == ""
-        return Done(code, err)
+    def run(output: str, *vary: str, more: tuple[str, ...] = (), code: int = 0) -> str:
+        varied = [part for text in vary for part in ("--vary", text)]
+        done = call("sweep", scene, "-o", tmp_path / output, *more, *varied, code=code)
+        assert done.out == ""
+        return done.err
 
-    return call
+    return run

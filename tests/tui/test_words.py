@@ -28,6 +28,7 @@ from rig.tui.pages.drop import verdict_words
 from rig.tui.state import DaemonState, read_state
 from rig.tui.widgets.bars import headline, hints
 from rig.tui.widgets.text import LONGEST, duration, plain
+from tests.refusals import refused
 from tests.tables import cases
 from tests.tui.lab import KEYS, text_of
 
@@ -214,22 +215,18 @@ def test_a_file_changes_keys_and_takes_them_from_others(tmp_path):
 def test_f9_always_stops_and_enter_goes_on():
     given = merge_keys({"stop": "f12", "go_on": "space"}, "k")
     assert (given["stop"], given["go_on"]) == ("f12,f9", "space,enter")
-    with pytest.raises(InputError, match="f9 already belongs to stop"):
-        merge_keys({"note": "f9"}, "k")
+    refused(InputError, "f9 already belongs to stop", merge_keys, {"note": "f9"}, "k")
 
 
 @cases
 def test_a_wrong_key_file_says_what_is_wrong(tmp_path, text, said):
     file = tmp_path / "keys.toml"
     file.write_text(text, "utf-8")
-    with pytest.raises(InputError) as caught:
-        read_keys(file)
-    assert said in str(caught.value)
+    assert said in str(refused(InputError, "", read_keys, file))
 
 
 def test_a_key_file_that_was_named_must_be_there(tmp_path):
-    with pytest.raises(InputError, match="No such file"):
-        read_keys(tmp_path / "none.toml")
+    refused(InputError, "No such file", read_keys, tmp_path / "none.toml")
 
 
 def test_without_a_file_the_keys_are_the_tables(tmp_path, monkeypatch):

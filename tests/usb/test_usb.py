@@ -6,12 +6,13 @@ import re
 import runpy
 import shutil
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 from serial.tools.list_ports_common import ListPortInfo
 
 from rig.boards import PICO
-from rig.cli import _parser, main
+from rig.cli import _parser
 from rig.errors import DeviceError
 from rig.flash.drive import pico_ports
 from rig.usb.listing import KNOWN, Known, SerialPort, path_of, serial_number_at, serial_ports
@@ -45,15 +46,11 @@ def plugged(monkeypatch):
 
 @pytest.fixture
 def never(monkeypatch):
-    def fail(url):
-        raise AssertionError(f"{url} was opened")
-
-    monkeypatch.setattr("rig.commands.ports.open_port", fail)
+    monkeypatch.setattr("rig.commands.ports.open_port", Mock(side_effect=AssertionError))
 
 
-def test_candidates_come_first_and_the_others_say_why_not(plugged, never, capsys):
-    assert main(["ports"]) == 0
-    lines = capsys.readouterr().out.splitlines()
+def test_candidates_come_first_and_the_others_say_why_not(plugged, never, call):
+    lines = call("ports").out.splitlines()
     assert [line.split()[0] for line in lines] == [
         *("/dev/ttyACM3", "/dev/ttyS0", "/dev/ttyUSB0", "/dev/ttyUSB1")
     ]
@@ -63,9 +60,8 @@ def test_candidates_come_first_and_the_others_say_why_not(plugged, never, capsys
     assert "skipped: no board's USB numbers" in lines[3]
 
 
-def test_json_has_everything(plugged, never, capsys):
-    assert main(["ports", "--json"]) == 0
-    first, *rest = json.loads(capsys.readouterr().out)["ports"]
+def test_json_has_everything(plugged, never, call):
+    first, *rest = json.loads(call("ports", "--json").out)["ports"]
     assert first == {
         "path": "/dev/ttyACM3",
         "vid": 0x2341,
@@ -83,34 +79,26 @@ def test_json_has_everything(plugged, never, capsys):
     assert not any(port["candidate"] for port in rest)
 
 
-def test_nothing_there_is_said(plugged, never, capsys):
+def test_nothing_there_is_said(plugged, never, call):
     plugged()
-    assert main(["ports"]) == 0
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert "no board found" in err
+    done = call("ports")
+    assert done.out == ""
+    assert "no board found" in done.err
 
 
-def test_only_candidates_are_asked_who_they_are(plugged, monkeypatch, capsys):
-    opened = []
-
-    def refuse(url):
-        opened.append(url)
-        raise DeviceError(f"cannot open {url}: busy", "close it")
-
-    monkeypatch.setattr("rig.commands.ports.open_port", refuse)
-    assert main(["ports", "--identify"]) == 0
-    assert "cannot open /dev/ttyACM3: busy" in capsys.readouterr().out
-    assert main(["ports", "--identify", "/dev/ttyUSB0"]) == 0
-    assert opened == ["/dev/ttyACM3", "/dev/ttyUSB0"]
+def test_only_candidates_are_asked_who_they_are(plugged, monkeypatch, call):
+    busy = Mock(side_effect=DeviceError("it is busy", "close it"))
+    monkeypatch.setattr("rig.commands.ports.open_port", busy)
+    assert "it is busy" in call("ports", "--identify").out
+    call("ports", "--identify", "/dev/ttyUSB0")
+    assert [asked.args[0] for asked in busy.call_args_list] == ["/dev/ttyACM3", "/dev/ttyUSB0"]
 
 
-def test_who_is_there_is_said_and_that_boards_share_an_id(plugged, capsys):
+def test_who_is_there_is_said_and_that_boards_share_an_id(plugged, call):
     with PtyBoard(board="Arduino Uno") as one, PtyBoard(board="Arduino Uno") as other:
-        assert main(["ports", "--identify", one.path, other.path]) == 0
-    out, err = capsys.readouterr()
-    assert f"{other.path}  Arduino Uno, sim, id " in out.splitlines()[-1]
-    assert re.search("several boards have the id [0-9a-f]{16}: erase", err)
+        done = call("ports", "--identify", one.path, other.path)
+    assert f"{other.path}  Arduino Uno, sim, id " in done.out.splitlines()[-1]
+    assert re.search("several boards have the id [0-9a-f]{16}: erase", done.err)
 
 
 def test_a_board_is_found_again_wherever_it_is_plugged_in(plugged, tmp_path):
@@ -213,32 +201,30 @@ def units(tmp_path, monkeypatch):
 
 
 @cases
-def test_the_unit_starts_a_daemon_at_the_board(units, capsys, words, service, command):
-    assert main(["service", "install", *words]) == 0
+def test_the_unit_starts_a_daemon_at_the_board(units, call, words, service, command):
+    done = call("service", "install", *words)
     (unit,) = units.iterdir()
     assert unit.name == f"{service}.service"
     text = unit.read_text()
     (line,) = [line for line in text.splitlines() if line.startswith("ExecStart=")]
     assert f" {command} $RIG_OPTIONS" in line
     assert "EnvironmentFile=-" in text
-    assert f"enable --now {service}\n" in capsys.readouterr().err
+    assert f"enable --now {service}\n" in done.err
     if IS_HERE:
         assert complaints_of(unit) == []
 
 
-def test_a_port_is_named_so_that_it_stays(units, tmp_path, monkeypatch, capsys):
+def test_a_port_is_named_so_that_it_stays(units, tmp_path, monkeypatch, call):
     link, device = tmp_path / "usb-Pico", tmp_path / "ttyACM0"
     link.symlink_to(device)
     monkeypatch.setattr(
         "rig.commands.service_install.Path",
         lambda path: tmp_path if "by-id" in path else Path(path),
     )
-    assert main(["service", "install", "--port", str(device)]) == 0
-    assert f".service: {link}\n" in capsys.readouterr().err
+    assert f".service: {link}\n" in call("service", "install", "--port", device).err
 
 
-def test_without_a_board_there_is_no_unit(units, monkeypatch, capsys):
+def test_without_a_board_there_is_no_unit(units, monkeypatch, call):
     monkeypatch.setattr("rig.usb.listing.serial_ports", list)
-    assert main(["service", "install"]) == 4
-    assert "no board found" in capsys.readouterr().err
+    assert "no board found" in call("service", "install", code=4).err
     assert not units.exists()

@@ -1,7 +1,5 @@
 """avr8js behind the face that `rig_emulator.avr.Avr` shows to a `Stand`."""
 
-from __future__ import annotations
-
 import fcntl
 import json
 import shutil
