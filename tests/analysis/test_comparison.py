@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from rig.analysis.comparison import compare
+from rig.analysis.curves import model_curves
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.result import Deviation, Measured, good_runs
 from rig.protocol.plan import runs
@@ -95,3 +96,10 @@ def test_gravity_is_compared_with_what_the_protocol_states():
     )
     (comparison,) = compare(stated, [drop])
     assert comparison.differences[0].normalized_error == pytest.approx(0.05 / (Z * 0.05), rel=2e-6)
+
+
+def test_curves_of_exact_coefficients_have_no_width():
+    known = replace(EXACT, drop=Quantity(0.18), gravity=Quantity(9.81))
+    curves = model_curves(replace(known, surface=replace(EXACT.surface, pile=None)))
+    assert {*curves["separation_U95_m"], *curves["speed_U95_m_s"]} == {0.0}
+    assert min(model_curves(UNIFORM)["speed_U95_m_s"]) > 0.0

@@ -11,6 +11,7 @@ from contextlib import contextmanager
 
 import pytest
 
+from rig.daemon.worker import STALL_S
 from rig.errors import SessionError, StoppedError
 from rig.link.messages import TEST_RUN, Arm, Phase, pack_label
 from rig.recorder.controller import Controller
@@ -159,6 +160,47 @@ def test_a_drop_that_a_restart_of_the_board_cut_is_shown_as_interrupted(tmp_path
     drop = box.worker.published.get("drop")
     assert box.on_disk("state", (1, 1))[-1:] == [drop["state"]] == ["interrupted"]
     box.ends_well()
+
+
+def test_who_is_held_up_says_by_what_and_whether_anything_is_armed(tmp_path, monkeypatch):
+    box = Box(tmp_path, monkeypatch)
+    worker = box.worker
+
+    def stalled(since_s, disk_s):
+        monkeypatch.setattr(worker, "_due_s", box.now() - since_s)
+        monkeypatch.setattr(worker, "disk_s", lambda: disk_s)
+        trouble = worker.stall()
+        return trouble and trouble.reasons[0].code
+
+    assert [stalled(2.0 * STALL_S, disk_s) for disk_s in (0.0, 1.0)] == ["held_up", "disk_slow"]
+    assert [stalled(0.5 * STALL_S, disk_s) for disk_s in (0.0, 1.0)] == [None, None]
+    box.arm()
+    armed = [stalled(2.0 * STALL_S, disk_s) for disk_s in (0.0, 1.0)]
+    assert armed == ["held_up_armed", "disk_slow_armed"]
+    box.kill()
+
+
+def test_what_fails_is_in_the_state_before_it_is_answered(tmp_path, monkeypatch):
+    box, seen = Box(tmp_path, monkeypatch), []
+    box.arm()
+
+    def fail(_):
+        raise SessionError("the disk is full", "make room")
+
+    outcome = box.worker.submit(fail, "A")
+    outcome.add_done_callback(lambda _: seen.append(box.worker.published.get("error")["message"]))
+    box.turned()
+    assert seen == ["the disk is full"]
+    assert box.board._controller.phase is not Phase.ARMED, "what cannot be kept must not fall"
+    box.kill()
+
+
+def test_stop_answers_what_waits(tmp_path, monkeypatch):
+    box = Box(tmp_path, monkeypatch)
+    waiting = [box.worker.submit(lambda c: c.opened, "A") for _ in range(2)]
+    box.stop()
+    assert all(isinstance(one.exception(timeout=0.0), StoppedError) for one in waiting)
+    box.kill()
 
 
 def test_a_session_that_is_opened_ends_the_trouble_of_the_one_before(tmp_path, monkeypatch):

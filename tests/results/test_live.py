@@ -1,5 +1,6 @@
 """The live analysis says what the whole one does; a better measurement brings what was promised."""
 
+import math
 import shutil
 from dataclasses import replace
 
@@ -7,9 +8,12 @@ import pytest
 
 from rig.analysis import identify
 from rig.analysis.comparison import compare
+from rig.analysis.distributions import coverage_factor
 from rig.analysis.drop import DropCase
 from rig.analysis.joint_fit import FEWEST
+from rig.analysis.result import Measured
 from rig.analysis.session import analyze
+from rig.analysis.summary import Incline
 from rig.clock.calibration import TimeScale
 from rig.reasons import make_reason, plain_reason
 from rig.records import Job
@@ -149,6 +153,15 @@ def test_what_is_measured_better_brings_at_least_what_was_promised():
     assert again.means[name].expanded < 1.02 * promised.then < 1.02 * promised.now
     assert promised.sentence.startswith("If the ")
     assert promised.json()["U95_at_most"] == promised.then
+
+
+def test_a_better_input_leaves_the_other_lines_and_their_degrees_of_freedom():
+    mean = Measured(6.0, 5e-3, 100.0, {"runs": 3e-3, "common": 4e-3})
+    line = Incline(40.0, 4, {"speed_m_s": mean}, {}, {}, causes={"speed_m_s": {"datum": 4e-3}})
+    (better,) = improvements([line])
+    rest = 9e-6 + 16e-6 / better.times_better**2
+    degrees = 100.0 * (rest / 25e-6) ** 2
+    assert better.then == pytest.approx(coverage_factor(degrees) * math.sqrt(rest))
 
 
 def test_reasons_of_a_blind_session_state_no_measured_value():
