@@ -64,7 +64,7 @@ _HEAD = """\
 # Faults put into the source
 
 `./run bench mutation`: {count} faults drawn by seed {seed}, one at a time, each tried by the tests
-that run through its line."""
+that run through its line, the quickest of them that take a minute together."""
 
 
 class Mutant(NamedTuple):
