@@ -16,7 +16,7 @@ from rig.analysis.explanations import Explainer
 from rig.analysis.faults import Premise, Suspects
 from rig.analysis.fit import Begun, DropFit, Fit, settle
 from rig.analysis.gravity import free_gravity
-from rig.analysis.identify import DropIdentity, identify, pattern_faults
+from rig.analysis.identify import DropIdentity, few_edges, identify, pattern_faults
 from rig.analysis.joint_fit import by_itself
 from rig.analysis.last_passages import last_passages
 from rig.analysis.result import GOOD, Audit, Deviation, DropResult
@@ -144,14 +144,18 @@ class DropCase:
             reasons = (make_reason("record_damaged", text=drop.damage),)
             return DropResult(self.run, drop.attempt, "void", reasons, Audit(), damaged=True), None
         case = stated = self._at_contact()
-        fit = whole = stated._fit(readings)
+        reading, fit = stated._fit(readings)
+        with_all = reading, fit
         while low := gates_too_low(case.protocol, case.records, fit):
             case = replace(case, aside=(*case.aside, *low))
-            fit = case._fit(readings, fit)
-            without = result, _ = case._judge(readings, fit, explain=False)
+            if fit is None:
+                reading, fit = case._fit(readings)
+            else:
+                fit = settle(case._model(fit.model.alpha), fit.x)
+            without = result, _ = case._judge(reading, fit, readings, explain=False)
             if not is_wrong(result.reasons):
                 return without
-        return stated._judge(readings, whole, explain=explain)
+        return stated._judge(*with_all, readings, explain=explain)
 
     def _at_contact(self) -> DropCase:
         run = self.run
@@ -172,26 +176,36 @@ class DropCase:
             earliest = -math.inf if self.drop.fire_tick is None else 0.0
             identification = identify(self.protocol, rough.records, rough.scale.u, earliest)
             unlike = pattern_faults(identification, self.protocol.vocabulary)
-            drop = None if unlike else identification.drop
-            reading = DropIdentity(rough.scale, unlike, drop.begun if drop else None)
+            best = None if unlike else identification.drop
+            reading = DropIdentity(rough.scale, unlike, best.begun if best else None)
             readings[self.aside] = reading
         return reading
 
     def _fit(
-        self, readings: dict[tuple[int, ...], DropIdentity], before: Fit | None = None
-    ) -> Fit | None:
-        """Fit the drop if it is identified; `before` is a fit of the same drop with more gates."""
-        if before is not None:
-            return settle(self._model(before.model.alpha), before.x)
-        begun = self._identify(readings).begun
-        return begun and settle(self._model(begun.alpha), begun.x, begun.matches)
+        self, readings: dict[tuple[int, ...], DropIdentity]
+    ) -> tuple[DropIdentity, Fit | None]:
+        """Return the identification of the drop, and its fit if the edges match a fall."""
+        reading = self._identify(readings)
+        begun = reading.begun
+        if begun is None:
+            return reading, None
+        model, x = self._model(begun.alpha), begun.x.copy()
+        clock = model.unknowns["clock"]
+        x[clock] = (1.0 + x[clock]) * self.scale.hz / reading.scale.hz - 1.0
+        fit = settle(model, x, begun.matches)
+        unlike = few_edges(fit.shares, self.protocol.vocabulary)
+        return replace(reading, unlike=unlike), None if unlike else fit
 
     def _judge(
-        self, readings: dict[tuple[int, ...], DropIdentity], fit: Fit | None, *, explain: bool
+        self,
+        reading: DropIdentity,
+        fit: Fit | None,
+        readings: dict[tuple[int, ...], DropIdentity],
+        *,
+        explain: bool,
     ) -> tuple[DropResult, Fit | None]:
         """Return the drop's result and its fit, if that is good enough for values."""
         protocol, run, drop, records = self.protocol, self.run, self.drop, self.records
-        reading = readings.get(self.aside, DropIdentity(self.scale, {}))
         audit = _blank_audit(drop, records)
         unlike = {reason.text: reason for reason in reading.unlike.values()}.values()
         doubts = silent(protocol, records) if reading.unlike else ()
@@ -202,7 +216,8 @@ class DropCase:
                 if reading.explained is None:
                     explainer = self._explainer(reading.scale, suspects(records))
                     reading = replace(reading, explained=explainer.name_fault(None))
-                    readings[self.aside] = reading
+                    known = readings[self.aside]
+                    readings[self.aside] = replace(known, explained=reading.explained)
                 reasons = (*reasons, *(reading.explained or ()))
             return DropResult(run, drop.attempt, verdict, reasons, audit), None
         unmatched = unmatched_edges(fit)

@@ -193,7 +193,7 @@ class Explainer:
 
     def _read(self, protocol: Protocol, records: Sequence[ChainRecord]) -> Reading | None:
         """Return the best reading near the stated values; quicker than all of `identify`."""
-        return identify(protocol, records, self.clock_u, batches=1).reading
+        return identify(protocol, records, self.clock_u, batches=1).fit_reading()
 
     def _along(self, fit: Fit) -> Iterator[Explanation]:
         """Yield fits of the continuous faults with the largest gain by the score test."""

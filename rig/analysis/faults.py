@@ -42,7 +42,7 @@ class Premise(NamedTuple):
 
     def with_gates(self, gates: Sequence[Gate]) -> Premise:
         """Return the premise with other gates."""
-        return self.change(gates=replace(self.protocol.gates, gates=tuple(gates)))
+        return self._replace(protocol=self.protocol.with_gates(gates))
 
 
 Change = Callable[[Premise, float], Premise]

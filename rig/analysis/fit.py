@@ -64,6 +64,15 @@ class DropFit:
         return sum(map(count_matched, self.matches.values()))
 
     @property
+    def shares(self) -> dict[str, float]:
+        """Matched share of each side's expected edges, by role."""
+        records = self.model.records
+        return {
+            role: count_matched(match) / max(1, records[role].edge_count)
+            for role, match in self.matches.items()
+        }
+
+    @property
     def rods(self) -> dict[int, int]:
         """Rod of every matched edge, by its number in the drop."""
         rods: dict[int, int] = {}
@@ -124,13 +133,14 @@ def match(model: DropModel, x: Array, *, late: bool = True) -> Matches:
     Parameters
     ----------
     late
-        Whether also edges of rods that may have struck before, and are late by that.
+        Whether an edge may be late because its rod has struck before it passes, by the scatter of
+        such edges, but at most by a part of the rods' spacing.
     """
     matches: Matches = {}
     for role, pairing in model.pairings.items():
         heights, speeds = model.trajectory(role, x).heights(pairing.times * model.rate(x))
-        sd = np.hypot(_FINE, late * model.components.landed * model.expected[role].landed)
-        sd = np.minimum(sd, model.records[role].pitch / PART)
+        landed = model.components.landed * model.expected[role].landed
+        sd = np.hypot(_FINE, late * np.minimum(landed, model.records[role].pitch / PART))
         matches[role] = pairing.match(model.all_levels(role, x), heights, speeds, sd)
     return matches
 

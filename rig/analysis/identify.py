@@ -28,10 +28,9 @@ from rig.analysis.annealing import (
     log_density,
 )
 from rig.analysis.chain_records import SIDES, ChainRecord
-from rig.analysis.distributions import most_by_chance
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY
-from rig.analysis.fit import Begun, DropFit, Fit, count_matched, settle
+from rig.analysis.fit import Begun, DropFit, Fit, settle
 from rig.arrays import Index
 from rig.clock.calibration import TimeScale
 from rig.protocol.gates import CLEARANCE_M
@@ -94,11 +93,14 @@ class Identification:
     log_odds: float = math.inf
     other: Fit | None = None
 
-    @property
-    def reading(self) -> Reading | None:
-        """The best reading, fitted; `None` like `drop`."""
+    def fit_reading(self) -> Reading | None:
+        """Fit the best reading; `None` if there is none that explains the edges."""
         drop = self.drop
-        return None if drop is None else weigh(settle(drop.model, drop.x, drop.matches))
+        if drop is None:
+            return None
+        fit = drop if isinstance(drop, Fit) else settle(drop.model, drop.x, drop.matches)
+        reading = weigh(fit)
+        return reading if reading.evidence > 0.0 else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,28 +152,34 @@ def identify(
     # Evidence is relative to all edges being strays and every rod missed.
     if all(side and side[0].evidence > 0.0 for side in readings.values()):
         return _together(model, readings)
-    matched = {
+    shares = {
         role: max((reading.match_count for reading in side), default=0)
+        / max(1, model.records[role].edge_count)
         for role, side in readings.items()
     }
-    return Identification(None, _shares(model, matched))
+    return Identification(None, shares)
 
 
 def pattern_faults(
     identification: Identification, words: Vocabulary = ANY_SCENE
 ) -> dict[str, Reason]:
     """Return reasons why the edges do not match a fall of each chain, by role; empty if they do."""
-    reasons = {
-        role: make_reason("few_edges_fit", words, side=role, share=share)
-        for role, share in identification.shares.items()
-        if share < LEAST
-    }
+    reasons = few_edges(identification.shares, words)
     if not reasons and identification.drop is None:
         return dict.fromkeys(identification.shares, make_reason("no_fall", words))
     if not reasons and identification.log_odds < LEAD:
         odds = math.exp(identification.log_odds)
         return dict.fromkeys(identification.shares, make_reason("two_falls", words, odds=odds))
     return reasons
+
+
+def few_edges(shares: Mapping[str, float], words: Vocabulary) -> dict[str, Reason]:
+    """Return the reason for each side of whose edges too few fit a fall, by role."""
+    return {
+        role: make_reason("few_edges_fit", words, side=role, share=share)
+        for role, share in shares.items()
+        if share < LEAST
+    }
 
 
 def most_votes(protocol: Protocol, record: ChainRecord, clock_u: float) -> int:
@@ -183,18 +191,12 @@ def most_votes(protocol: Protocol, record: ChainRecord, clock_u: float) -> int:
 
 def well_read(fit: Fit) -> bool:
     """Whether nearly all matchable edges are matched, with usual scatter and unknowns in range."""
-    records = fit.model.records.values()
-    least = math.ceil(LEAST * sum(record.edge_count for record in records))
-    matchable = max(least, sum(map(possible, records)))
-    whole = matchable - fit.match_count <= most_missed(fit.model.protocol, matchable)
+    records, limit = fit.model.records.values(), fit.model.protocol.accept.missed_edges
+    expected = sum(record.edge_count for record in records)
+    matchable = sum(map(possible, records))
+    many = fit.match_count >= max(LEAST * max(1, expected), (1.0 - limit) * matchable)
     strain = float(np.abs(fit.model.unknowns.pull(fit.x)).max())
-    return whole and fit.estimate.scatter < RESTLESS and strain < STRAY
-
-
-def most_missed(protocol: Protocol, expected: int) -> float:
-    """Return how many of the expected edges a drop may lack, by its limit or by chance."""
-    limit = protocol.accept.missed_edges
-    return max(limit * expected, most_by_chance(expected, min(MISSED, limit / 2.0)))
+    return many and fit.estimate.scatter < RESTLESS and strain < STRAY
 
 
 def possible(record: ChainRecord) -> int:
@@ -287,8 +289,7 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[FallFit]]) -> Id
         best, evidence = likelier.fit, likelier.evidence
         if rest:
             odds, other = min(further, evidence - rest[0].evidence), rest[0].fit
-    shares = _shares(model, {role: count_matched(side) for role, side in best.matches.items()})
-    return Identification(best if evidence > 0.0 else None, shares, odds, other)
+    return Identification(best if evidence > 0.0 else None, best.shares, odds, other)
 
 
 def _begin(model: DropModel, sides: Mapping[str, FallFit]) -> DropFit:
@@ -297,10 +298,6 @@ def _begin(model: DropModel, sides: Mapping[str, FallFit]) -> DropFit:
     alpha = sides["impact"].values[ALPHA] if "impact" in sides else 0.0
     matches = {role: side.match for role, side in sides.items()}
     return DropFit(model.copy_with(alpha=alpha), matches, x)
-
-
-def _shares(model: DropModel, matched: Mapping[str, int]) -> dict[str, float]:
-    return {role: count / max(1, model.records[role].edge_count) for role, count in matched.items()}
 
 
 def weigh(fit: Fit) -> Reading:

@@ -25,7 +25,8 @@ def assert_same(one: DropResult, other: DropResult, share: float) -> None:
 
 
 @pytest.mark.parametrize(
-    ("scene", "seconds"), [("uniform", -0.25), ("graded", 0.5), ("single", 3.0), ("fence", -0.25)]
+    ("scene", "seconds"),
+    [("uniform", -0.25), ("graded", 0.5), ("single", 3.0), ("fence", -0.25), ("fence", 5400.0)],
 )
 def test_origin_and_unit_of_time_and_other_gates(scene, seconds):
     """An imported file counts as it likes, and has gates of another scene too."""

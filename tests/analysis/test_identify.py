@@ -178,7 +178,7 @@ def test_the_likeliest_of_all_readings_is_chosen(name):
     assert found.drop is not None
     assert found.drop.rods == given
     # Laplace's method is exact for what is normal; a fall is, but for the noise's own slope.
-    assert found.reading.evidence == pytest.approx(likeliest, abs=0.01)
+    assert found.fit_reading().evidence == pytest.approx(likeliest, abs=0.01)
     others = [row for row in rest if unlike(row[2], given)]
     most = likeliest - max((row[0] for row in others), default=-math.inf)
     least_odds = likeliest - max((row[1] for row in others), default=-math.inf)
@@ -198,7 +198,7 @@ def test_what_cannot_be_told_is_void_and_the_odds_are_stated():
     odds = likeliest - max(log for log, _, other in rest if unlike(other, given))
     assert odds < math.log(3.0)
     found = one.identify()
-    assert found.reading.evidence == pytest.approx(likeliest, abs=0.01)
+    assert found.fit_reading().evidence == pytest.approx(likeliest, abs=0.01)
     assert found.log_odds == pytest.approx(odds, abs=0.1)
     assert any(
         reason.values["odds"] == math.exp(found.log_odds)

@@ -16,7 +16,7 @@ from rig.protocol.plan import runs
 from rig.records import Edge
 from rig.units import Quantity
 from sim.dials import Dials
-from tests.analysis.drops import PROTOCOLS, case
+from tests.analysis.drops import PROTOCOLS, case, codes
 
 BALL, GLIDER = (reader.read(PROTOCOLS / f"{name}.yaml") for name in ("falling-ball", "glider"))
 BOTH = pytest.mark.parametrize("protocol", [BALL, GLIDER], ids=["ball", "glider"])
@@ -200,6 +200,18 @@ def test_a_pendulum_is_no_fall(amplitude_deg):
     assert result.verdict == "void"
     assert result.audit.matched == 2
     assert result.audit.unexplained == 40 - 4  # the last one may be a turn in the beam
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_ball_hung_elsewhere_or_a_gate_that_is_moved_is_named(seed):
+    """Two of eight edges may be missing by chance, or because the rig is not as stated."""
+    higher = replace(BALL, drop=replace(BALL.drop, value=BALL.drop.value + 0.015))
+    first, *others = BALL.gates.gates
+    moved = BALL.with_gates([replace(first, height=first.height + 0.008), *others])
+    for rig, code in ((higher, "drop_height"), (moved, "gate_height")):
+        result = replace(case(rig, Dials(), seed=seed), protocol=BALL).analyze()
+        assert result.verdict == "void"
+        assert code in codes(result)
 
 
 def test_all_gates_on_one_channel_are_no_fall_past_one_gate():

@@ -1,6 +1,7 @@
 """Rods that lie where others strike: drops of the resolved world on flat boards."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -39,6 +40,12 @@ def test_drops_on_a_pile_are_read_without_the_beams_in_it(piled):
         for name in HELD:
             measured = result.quantities[name]
             assert abs(measured.value - fall.truth[name]) < 2.0 * measured.expanded, name
+
+
+def test_what_was_found_at_another_rate_changes_nothing(piled):
+    case, _ = piled[0]
+    before = replace(case, scale=case.scale._replace(hz=1.2 * case.scale.hz)).summary()
+    assert case.summary(before).result == case.summary().result
 
 
 def test_what_was_found_of_it_is_kept_for_the_next_time(piled):
