@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 MAX_EVENTS = 500_000
 """Those of 600 drops of 25 rods past 16 gates; what has more is no record of drops."""
+_TURN = 600 * TICK_HZ
+"""Picoseconds from a time to the next within which a counter is taken to have begun anew."""
 STATES = ("", "clear", "blocked", "low", "high")
 """What begins with a change, of a beam or of a signal; nothing where the file does not say."""
 _REJECTED = len(STATES)
@@ -74,6 +76,10 @@ class SignalReader:
         is_filled = len(values) == 1 or 2 * filled >= (len(values) + 1) * len(sample)
         self.has_times = "time" in used
         self.has_names = not used.isdisjoint({"gate", "run"}) or bool(values)
+        named = {at for x in self.signals for at in x[-2:]}
+        counts = {at: sum(row.cell(at) != "" for row in sample) for at in named}
+        self.above = {at: "" for at, count in counts.items() if 0 < 2 * count <= len(sample)}
+        file.is_guess |= bool(self.above)
         self.sparse = {
             n for n, x in enumerate(self.signals) if len(values) > 1 and x.value.role != "moment"
         }
@@ -141,8 +147,9 @@ class SignalReader:
         if clock.role != "time":
             tick = round(self.base[0] * TICK_HZ + self.base[1] * tick)
         latest = self.latest.get(clock.at, tick)
-        if clock.wrap:
-            tick += clock.wrap * max(0, round((latest - tick) / clock.wrap))
+        for wrap in clock.wraps if tick < latest else ():
+            pause = (tick - latest) % wrap
+            tick = latest + pause if pause < _TURN else tick
         if self.is_sampled and tick < latest:
             self.file.problems.add(*row.place(clock.at), "time", "backwards", text=text)
         self.starts.setdefault(clock.at, tick)
@@ -157,15 +164,17 @@ class SignalReader:
             offset = tick - self.starts[signal.clock.at]
             self.samples[n].extend((row.line, offset, float(word)))
             return
+        if word in value.words:
+            word = ("high", "low")[value.words.index(word)]
         state = code_of(value.role, word or value.state)
         if state == _REJECTED:
             self._reject(row, value, word)
         elif state or not self.is_sampled:
-            run = names.setdefault(row.cell(signal.run_at) or signal.run, len(names))
+            run = names.setdefault(self._read_name(row, signal.run_at) or signal.run, len(names))
             before, self.values[n] = self.values.get(n), (state, run, block.number)
             if self.is_whole and before == self.values[n]:
                 return
-            label = row.cell(signal.gate_at) or signal.label or block.gate
+            label = self._read_name(row, signal.gate_at) or signal.label or block.gate
             key = n, block.number, run, names.setdefault(label, len(names))
             # A first row may be the state at the beginning of a run, and no change.
             is_start = self.is_whole or (state == STATES.index("clear") and tick == 0)
@@ -175,6 +184,13 @@ class SignalReader:
             self.changes.append(
                 (row.line, tick, 0, state, key[-1], run, clock, block.number, is_first)
             )
+
+    def _read_name(self, row: Row, at: int) -> str:
+        """Return what a row says of its run or gate; of merged cells only the first has a text."""
+        name = row.cell(at) or self.above.get(at, "")
+        if at in self.above:
+            self.above[at] = name
+        return name
 
     def _find_crossings(self, n: int) -> Changes:
         """Return where volts cross the middle; note how many do, or that nothing passes."""

@@ -170,7 +170,8 @@ def test_stacked_runs_are_runs_of_their_own(tmp_path):
     [
         ("t,x,y\n0.1,0,1\n0.14,0,2\n0.18,0,3\n0.22,0,4\n0.26,0,5\n", "regular_samples",
          "samples at regular times"),
-        ("Time (s),colour,mood\n" + "".join(f"0.{n},{n % 3},{n % 2}\n" for n in range(9)),
+        ("Time (s),colour,mood,taste,smell\n" + "".join(
+            f"0.{n}" + f",{n % 3}" * 4 + "\n" for n in range(9)),
          "not_accepted", "'colour' is not a heading that is understood"),
         ("Run,Time between gates (s)\n1,0.1\n2,0.1\n", "durations", "are durations"),
         ("Time (s),Volt\n" + "".join(f"{n},{n % 2 * 1e-3 + n % 7 * 1e-3}\n" for n in range(40)),
