@@ -1,7 +1,8 @@
 """Faults put into the software, one at a time, and whether any test notices.
 
-A fault is tried on a copy of the project, by the tests that run through its line, the quickest
-first, until one fails. Which those are is known from one run of all rooms' tests.
+A fault is tried on a copy of the project, by the tests that run through its line, until one fails:
+those of its own room before others, and the quickest first. Which run through it is known from one
+run of all rooms' tests.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from itertools import accumulate
+from itertools import accumulate, chain
 from pathlib import Path
 from queue import SimpleQueue
 from statistics import fmean
@@ -44,7 +45,7 @@ KEPT = ROOT / "out" / "mutation"
 _MEMORY_BYTES = 6 << 30
 _PATIENCE = 10.0
 """How many times as long as before tests may take until a fault counts as one that hangs."""
-_MOST_S = 40.0
+_MOST_S = 60.0
 """What the tests of a fault may take together, without it."""
 _START_S = 120.0  # until pytest has loaded everything, on a busy machine
 ROOMS = {
@@ -112,7 +113,7 @@ class Reached:
     lines: dict[str, dict[str, list[int]]]
 
     def tests(self, path: str, line: int) -> list[str]:
-        """List the tests that may notice a fault, the quickest first, until they take too long.
+        """List the tests that may notice a fault, as ranked above, until they take too long.
 
         Where none is known to run through the line (it runs when the file is loaded, or in a
         process that was killed), all that run through the file are, else all there are. Of the
@@ -124,23 +125,23 @@ class Reached:
         whole = set().union(*by_line.values()) or range(len(names))
         span = map(str, _within_a_function(path, line))
         found = set().union(*(by_line.get(at, ()) for at in span)) or whole
-        ranked = sorted((names[n] for n in found), key=lambda one: (self.seconds[one], one))
+        own = f"tests/{path.split('/')[1]}/"
+        ranked = sorted((names[n] for n in sorted(found)), key=self.seconds.__getitem__)
+        ranked.sort(key=lambda one: not one.startswith(own))
         spent = accumulate(self.seconds[one] for one in ranked)
         return [one for one, seconds in zip(ranked, spent, strict=True) if seconds <= _MOST_S]
 
 
 def _within_a_function(path: str, line: int) -> range:
     """Lines of the innermost statement of a function that a line is of; none outside of all."""
-    spans, functions = [], []
-    for node in ast.walk(ast.parse((ROOT / path).read_text("utf-8"))):
-        if isinstance(node, ast.stmt):
-            span = range(node.lineno, (node.end_lineno or node.lineno) + 1)
-            spans.append(span)
-            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-                functions.append(span)
-    if not any(line in span for span in functions):
-        return range(0)
-    return min((span for span in spans if line in span), key=len)
+    nodes = [*ast.walk(ast.parse((ROOT / path).read_text("utf-8")))]
+    functions = [one for one in nodes if isinstance(one, ast.FunctionDef | ast.AsyncFunctionDef)]
+    spans = [
+        range(node.lineno, (node.end_lineno or node.lineno) + 1)
+        for node in chain.from_iterable(map(ast.walk, functions))
+        if isinstance(node, ast.stmt)
+    ]
+    return min((span for span in spans if line in span), key=len, default=range(0))
 
 
 def run(arguments: Namespace) -> Iterator[Findings]:

@@ -158,47 +158,48 @@ def _free_fall(protocol: Protocol) -> PredictedIncline:
 
 def air_of(protocol: Protocol, name: str) -> list[float]:
     """κ of a chain on the leg before each impact, 1/m; empty without air."""
-    if protocol.drag is None:
+    drag, rods = protocol.drag, protocol.chains[name]
+    if drag is None:
         return []
-    rods = protocol.chains[name]
-    from rig.model.drag import cylinder_drag, leg_drags  # noqa: PLC0415 - only where there is air
-
-    drag = protocol.drag
-    if drag.terminal_speed is not None:
+    if drag.coefficient is None:
+        assert drag.terminal_speed is not None
         return [protocol.gravity.value / drag.terminal_speed.value**2] * rods.chain.rods
-    assert drag.coefficient is not None
-    medium = drag.coefficient.value, drag.air_density
-    drags = [cylinder_drag(*medium, d, rods.rod_length, rods.tilt_deg) for d in rods.diameters]
-    return leg_drags(rods.chain, drags)
+    return _kappas(rods, rods.rod_length, drag.coefficient.value, drag.air_density)
 
 
 def air_shares(protocol: Protocol) -> dict[str, list[float]]:
     """κ of each chain on the leg before each impact, in units of the first chain's as it hangs.
 
-    What the air takes goes with a rod's width over its mass: of like material, and where masses are
-    not given, with 1/diameter. Where widths are not known, all are taken to be alike.
+    What the air takes goes with a rod's width over its mass, whatever the coefficient: of like
+    material, and where masses are not given, with 1/diameter. Where widths are not known, or a
+    terminal speed is stated, all are taken to be alike.
     """
-    if protocol.drag is not None:
-        shares = {name: air_of(protocol, name) for name in protocol.chains}
-    else:
-        chains = protocol.chains.values()
-        if any(min(rods.diameters, default=0.0) == 0.0 for rods in chains):
-            return {name: [1.0] * rods.chain.rods for name, rods in protocol.chains.items()}
-        measured = all(rods.rod_length for rods in chains)
-        weighed = measured and all(rods.weighed for rods in chains)
-        shares = {
-            name: _per_mass(rods, rods.rod_length if measured else 1.0, weighed=weighed)
-            for name, rods in protocol.chains.items()
-        }
+    chains = protocol.chains.values()
+    known = all(rods.diameters and min(rods.diameters) for rods in chains)
+    if not known or (protocol.drag is not None and protocol.drag.coefficient is None):
+        return {name: [1.0] * rods.chain.rods for name, rods in protocol.chains.items()}
+    measured = all(rods.rod_length for rods in chains)
+    weighed = measured and all(rods.weighed for rods in chains)
+    shares = {
+        name: _kappas(rods, rods.rod_length if measured else 1.0, weighed=weighed)
+        for name, rods in protocol.chains.items()
+    }
     first = next(iter(shares.values()))[0]
     return {name: [kappa / first for kappa in kappas] for name, kappas in shares.items()}
 
 
-def _per_mass(rods: RodChain, length: float, *, weighed: bool) -> list[float]:
-    """Width over mass, up to a factor, of all rods from each one up."""
-    from rig.model.drag import cylinder_drag, leg_drags  # noqa: PLC0415 - only to measure
+def _kappas(
+    rods: RodChain,
+    length: float,
+    coefficient: float = 1.0,
+    density: float = 1.0,
+    *,
+    weighed: bool = True,
+) -> list[float]:
+    """Width over mass of all rods from each one up, by the masses given or by those of volumes."""
+    from rig.model.drag import cylinder_drag, leg_drags  # noqa: PLC0415 - only where there is air
 
-    drags = [cylinder_drag(1.0, 1.0, d, length, rods.tilt_deg) for d in rods.diameters]
+    drags = [cylinder_drag(coefficient, density, d, length, rods.tilt_deg) for d in rods.diameters]
     volumes = tuple(d * d * length for d in rods.diameters)
     return leg_drags(rods.chain if weighed else replace(rods.chain, masses=volumes), drags)
 

@@ -13,8 +13,6 @@ from rig.results.whole import results
 from rig.session.drop_check import ByteReplay, as_old_as
 from rig.session.reading import Reader
 
-_JOB = attrgetter("job")
-
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
@@ -30,22 +28,17 @@ class _ByBytes(Reader):
     def __init__(self, session: Reader) -> None:
         super().__init__(session.path, session.connection)
         replay = ByteReplay()
-        replay.feed(session.byte_log())
+        stored = {drop.job: drop for drop in session.drops(replay)}
         self.chunks = replay.fed
         self._samples = [sample for sample in replay.records if isinstance(sample, ClockSample)]
         self._pulses = [pulse for pulse in replay.records if isinstance(pulse, Pulse)]
-        acknowledged = replay.acknowledged_drops()
         # What was stored and not acknowledged any more still is in the bytes.
-        have = {drop.job for drop in acknowledged}
-        stored = {drop.job: drop for drop in session.drops()}
-        late = [drop for drop in replay.unfinished_drops() if drop.job in stored.keys() - have]
-        # What was acknowledged again, for the first ACKNOWLEDGE was lost on its way, counts once.
-        once = {
-            (drop.job, drop.certificate, drop.fire_tick, drop.edges): drop
-            for drop in [*acknowledged, *late]
-        }
-        drops = sorted(once.values(), key=_JOB)
-        self._drops = [as_old_as(stored.get(drop.job, drop), drop) for drop in drops]
+        due = stored.keys() | {drop.job for drop in replay.acknowledged_drops()}
+        self._drops = [
+            as_old_as(stored.get(job, drop), drop)
+            for job, drop in sorted(replay.drops().items())
+            if job in due
+        ]
 
     def digest(self) -> None:
         return None
@@ -70,7 +63,7 @@ def replay(session: Reader, progress: Progress | None = None) -> Outcome:
     with session.snapshot():
         again = _ByBytes(session)
         if again.chunks:
-            pairs["drops"] = list(again.drops()), sorted(session.drops(), key=_JOB)
+            pairs["drops"] = list(again.drops()), sorted(session.drops(), key=attrgetter("job"))
             pairs["clock samples"] = again.pings(), session.pings()
             if any(pulses := (again.pulses(), session.pulses())):
                 pairs["reference pulses"] = pulses

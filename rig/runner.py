@@ -18,7 +18,7 @@ from rig.daemon.connecting import connect
 from rig.errors import DeviceError
 from rig.link.refusals import DeviceRefusedError
 from rig.protocol import reader
-from rig.protocol.measurable import check_gates, check_recordable
+from rig.protocol.measurable import check_recordable
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
 from rig.recorder.interrupts import Interrupts
@@ -83,7 +83,6 @@ def run_protocol(
         The device is in trouble; what was measured is in the session, which can be continued.
     """
     protocol = reader.read(source)
-    check_gates(protocol)
     check_recordable(protocol)
     interrupts = Interrupts()
     with interrupts.caught():

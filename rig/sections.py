@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TypeVar
 
 from rig.errors import RigError
-
-T = TypeVar("T")
 
 
 class Sections:
@@ -49,10 +46,3 @@ class Sections:
                 error.message if isinstance(error, RigError) else f"{type(error).__name__}: {error}"
             )
             self.failed[name] = f"{name} could not be made: {' '.join(why.split())}"
-
-    def make(self, name: str, make: Callable[[], T]) -> T | None:
-        """Make one section, see `alone`; `None` where that fails."""
-        results: list[T] = []
-        with self.alone(name):
-            results.append(make())
-        return results[0] if results else None

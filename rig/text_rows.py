@@ -1,6 +1,6 @@
-"""Tables that the program is made from: a text file beside the module that reads it, a row a line.
+"""Texts that the program is made from, each a file beside the module that reads it.
 
-A line that begins with ``#`` explains the table to whoever edits it.
+In a table, what begins with ``#`` explains it to whoever edits it.
 """
 
 from __future__ import annotations
@@ -8,19 +8,36 @@ from __future__ import annotations
 from pathlib import Path
 
 
-def read_rows(module: str, name: str = "", mark: str | None = "|") -> list[list[str]]:
-    """Return the rows of a table by cells, without the blanks around them.
+def read_text(module: str, name: str = "") -> str:
+    """Return a text.
 
     Parameters
     ----------
     module
-        Its ``__file__``.
+        The ``__file__`` of the module.
     name
-        Name of the table; by default that of the module, with the ending ``.txt``.
+        Name of the file; by default that of the module, with the ending ``.txt``.
+    """
+    place = Path(module).with_name(name) if name else Path(module).with_suffix(".txt")
+    return place.read_text("utf-8")
+
+
+def read_paragraphs(module: str, name: str = "") -> list[list[str]]:
+    """Return the lines of each paragraph of a table; arguments as for `read_text`."""
+    paragraphs = read_text(module, name).strip().split("\n\n")
+    return [paragraph.splitlines() for paragraph in paragraphs if paragraph[0] != "#"]
+
+
+def read_rows(module: str, name: str = "", mark: str | None = "|") -> list[list[str]]:
+    """Return the rows of a table, one a line, by cells without the blanks around them.
+
+    Parameters
+    ----------
+    module, name
+        As for `read_text`.
     mark
         What parts the cells; if `None`, blanks.
     """
-    place = Path(module).with_name(name) if name else Path(module).with_suffix(".txt")
-    lines = place.read_text("utf-8").splitlines()
+    lines = read_text(module, name).splitlines()
     rows = (line.split(mark) for line in lines if line and line[0] != "#")
     return [[*map(str.strip, row)] for row in rows]

@@ -1,7 +1,8 @@
-"""One thread for linear algebra: with small matrices, threads get in each other's way."""
+"""Processors, and one thread for linear algebra: with small matrices threads are in the way."""
 
 from __future__ import annotations
 
+import os
 import threading
 from contextlib import ContextDecorator
 from functools import cache
@@ -44,6 +45,11 @@ With several, a sum's last digits depend on how busy the machine is, and on two 
 costs twice the processor time. Others' matrices are theirs: the bound ends with the last of all
 calls that are under way, in whatever threads.
 """
+
+
+def processors() -> int:
+    """Return the number of processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @cache

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import IntEnum
-from pathlib import Path
 from string import Template
 
 from rig import errors
 from rig.errors import RigError
+from rig.text_rows import read_paragraphs
 
 OPERATOR, NOTE, SENTENCE = "operator", "note", "sentence"
 """Codes of what is only text: a cause to reject a drop, a note to it, a sentence of an old file."""
@@ -51,14 +51,11 @@ class Wording:
     error: type[RigError] = RigError
 
 
-def _read_rows(text: str) -> tuple[dict[str, Wording], dict[str, str]]:
+def _read_rows() -> tuple[dict[str, Wording], dict[str, str]]:
     """Return the rows of the table by their codes, and the texts that several share."""
     rows: dict[str, Wording] = {}
     shared: dict[str, str] = {}
-    for paragraph in text.split("\n\n"):
-        if paragraph.startswith("#"):
-            continue
-        head, *lines = paragraph.splitlines()
+    for head, *lines in read_paragraphs(__file__):
         if head == "shared":
             shared = dict(line.strip().split(": ", 1) for line in lines)
             continue
@@ -71,6 +68,6 @@ def _read_rows(text: str) -> tuple[dict[str, Wording], dict[str, str]]:
     return rows, shared
 
 
-WORDINGS, _SHARED = _read_rows(Path(__file__).with_suffix(".txt").read_text("utf-8"))
+WORDINGS, _SHARED = _read_rows()
 """What the program says of each code, and what several of them say."""
 LOOK = _SHARED["look"]

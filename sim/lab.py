@@ -17,7 +17,7 @@ from rig.model.fall import hits, kicks
 from rig.model.impact import impact_on
 from rig.model.surface import Surface
 from rig.protocol.contact import contact_level, higher_contacts
-from rig.protocol.measurable import check_measurable
+from rig.protocol.measurable import check_released
 from rig.protocol.plan import runs
 from rig.protocol.protocol import GUESSED
 from rig.units import Quantity
@@ -120,14 +120,14 @@ class ChainLab:
         seed: int,
         tell: Callable[[Truth], None] = lambda _: None,
     ) -> None:
-        check_measurable(protocol)
+        check_released(protocol)
         self.protocol = protocol
         self.seed = seed
         self.dials = dials = dials.on(protocol, self._share)
         self.tell = tell
         self.series = 0
         self.runs = {run.number: run for run in runs(protocol)}
-        self.gates = protocol.gates.gates if protocol.gates else ()
+        self.gates = protocol.gates.gates
         rig = self._rng("rig")
         self.hang_height = protocol.drop.value + protocol.drop.u * dials.drop_error * rig.normal()
         self.surface = self._surface()

@@ -55,7 +55,6 @@ def two_gate_timer(protocol: Protocol, drop: Drop, hz: float) -> TimerReading | 
 
 
 def _passage(protocol: Protocol, drop: Drop, hz: float, side: Side) -> _Passage | None:
-    assert protocol.gates is not None
     gates = sorted(protocol.gates.on(side), key=lambda gate: gate.height)[1:3]
     if len(gates) < 2:
         return None
@@ -86,7 +85,6 @@ def line_fit(protocol: Protocol, drop: Drop, hz: float) -> TimerReading | None:
     TimerReading or None
         Nothing where fewer than two gates of a side saw a passage.
     """
-    assert protocol.gates is not None
     pitch = min(
         high - low
         for one in protocol.chains.values()
@@ -113,7 +111,6 @@ def _passages(
     It is the last at every beam but the lowest, where rods bounce: there it is the next after
     that of the beam above.
     """
-    assert protocol.gates is not None
     gates = sorted(protocol.gates.on(side), key=lambda gate: -gate.height)
     found: list[tuple[float, float]] = []
     for gate in gates:

@@ -18,7 +18,6 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.analysis.chain_records import WIDER, ChainRecord, EdgeTrain
-from rig.analysis.components import Components
 from rig.analysis.departures import LOWEST_START
 from rig.analysis.free_flight import FAINT
 from rig.analysis.trajectory import (
@@ -231,7 +230,7 @@ class Pairing:
         edge_of[sides[0.5 * length > WIDER * self.widths[sides]]] = -1
         return edge_of
 
-    def match(self, levels: Array, heights: Array, speeds: Array, scale: float) -> Index:
+    def match(self, levels: Array, heights: Array, speeds: Array, scale: Array) -> Index:
         """Match the edges to rods.
 
         Parameters
@@ -318,14 +317,13 @@ class SideFall:
         record: ChainRecord,
         pairing: Pairing,
         clock_u: float,
-        components: Components,
         sigma: Array = ONE,
     ) -> SideFall:
         """Return the model of a side with the protocol's values and priors."""
         stated, sd = np.zeros(UNKNOWNS), np.zeros(UNKNOWNS)
         stated[START], stated[PULL] = protocol.drop.value, protocol.gravity.value
         stated[ALPHA], (stated[DRAG], sd[DRAG]) = record.alpha, prior_air(protocol)
-        sd[RELEASE], sd[START] = 1.0, math.hypot(protocol.drop.u, components.hang)
+        sd[RELEASE], sd[START] = 1.0, math.hypot(protocol.drop.u, protocol.priors.hang)
         sd[CLOCK] = clock_u
         sd[PULL] = ANY_GRAVITY if protocol.surface is None else protocol.gravity.u
         if record.ratios is not None:
@@ -340,12 +338,8 @@ class SideFall:
 
     @cached_property
     def slack(self) -> float:
-        """Standard deviation of the first step, m: a part of the least spacing of two rods.
-
-        For a single object, a part of its width.
-        """
-        places, widths = self.record.chain.chain.heights, self.record.chain.widths
-        return float(min(np.diff(places) if len(places) > 1 else widths)) / PART
+        """Standard deviation of the first step, m: a part of the least spacing of two rods."""
+        return self.record.pitch / PART
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:

@@ -192,6 +192,12 @@ class ChainRecord:
         return places - self.higher if self.higher else places
 
     @property
+    def pitch(self) -> float:
+        """Least spacing of two rods, m; of a single object its width."""
+        places, widths = self.chain.chain.heights, self.chain.widths
+        return float(min(np.diff(places) if len(places) > 1 else widths))
+
+    @property
     def rebound_widths(self) -> Sequence[float]:
         """Widths of the rods if rebounding rods may cross their beams, m; else empty."""
         thrown = self.ratios is not None and self.chain.chain.rods > 1
@@ -313,7 +319,6 @@ def chain_records(
     aside
         Numbers of the gates that are left out, in the protocol's list.
     """
-    assert protocol.gates is not None
     edges, shares = EdgeArrays.of(drop.edges, hz), air_shares(protocol)
     sides: tuple[tuple[Side, str | None], ...] = (("impact", run.impact), ("free", run.free))
     records = []

@@ -91,7 +91,6 @@ class Discrepancy:
             As in `rig.analysis.equations.ExpectedEdges`.
         """
         assert record.ratios is not None
-        assert protocol.gates is not None
         strikes, gains = record.strikes, np.full(record.strikes.size, record.alpha)
         start, gravity = max(protocol.drop.value, LOWEST_START), protocol.gravity.value
         nominal = struck_trajectory(

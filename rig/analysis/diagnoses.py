@@ -17,7 +17,7 @@ from rig.analysis.chain_records import SIDES, ChainRecord, EdgeTrain
 from rig.analysis.distributions import most_by_chance
 from rig.analysis.equations import STRAY, standardise
 from rig.analysis.faults import Suspects, gate_values
-from rig.analysis.fit import Begun, Fit, Matches
+from rig.analysis.fit import Fit, Matches, match
 from rig.arrays import Index
 from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, make_reason
@@ -92,11 +92,11 @@ def gate_counts(records: Iterable[ChainRecord], matches: Matches | None = None) 
     counts = []
     for record in records:
         whole = np.full(record.edge_count, -1) if matches is None else matches[record.role]
-        for train, _, match in record.by_gate(whole):
+        for train, _, edges in record.by_gate(whole):
             if train.rods.size and train.times.size:
                 number = np.arange(train.rods.size)
                 first = np.where(number < train.times.size, number, -1)
-                counts.append(GateCount(record.role, train, first if matches is None else match))
+                counts.append(GateCount(record.role, train, first if matches is None else edges))
     return counts
 
 
@@ -162,23 +162,22 @@ def _are_crossed(one: GateCount, other: GateCount) -> bool:
 
 
 def _values(protocol: Protocol, train: EdgeTrain) -> dict[str, Any]:
-    assert protocol.gates is not None
     return gate_values(protocol.gates.gates[train.gate])
 
 
 def gates_too_low(
-    protocol: Protocol, records: Iterable[ChainRecord], begun: Begun | None
+    protocol: Protocol, records: Iterable[ChainRecord], fit: Fit | None
 ) -> tuple[int, ...]:
     """Return the lowest gates beside the striking chain that miss more rods than by chance.
 
-    There, rods strike before they pass, or lie in the beam. The highest gate is never left out.
-    The rate of chance misses is that of all other gates.
+    There, rods strike before they pass, or lie in the beam; rods that pass late count as missed.
+    The highest gate is never left out. The rate of chance misses is that of all other gates.
 
     Parameters
     ----------
     records
         The chains with their trains.
-    begun
+    fit
         `None` if the drop is not identified: then the number of edges is used.
 
     Returns
@@ -186,8 +185,8 @@ def gates_too_low(
     tuple of int
         Numbers of the gates in the protocol's list.
     """
-    assert protocol.gates is not None
-    counts = gate_counts(records, None if begun is None else begun.matches)
+    in_time = None if fit is None else match(fit.model, fit.x, late=False)
+    counts = gate_counts(records, in_time)
     due, hidden = sum(gate.due for gate in counts), sum(gate.hidden for gate in counts)
     struck, gates = [gate for gate in counts if gate.role == "impact"], protocol.gates.gates
     low: list[int] = []

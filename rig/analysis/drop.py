@@ -7,28 +7,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-
 from rig.analysis.budgets import Budgets
 from rig.analysis.chain_records import ChainRecord, chain_records, thin
-from rig.analysis.components import Components, priors
 from rig.analysis.diagnoses import gates_too_low, silent, suspects
 from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer
 from rig.analysis.faults import Premise, Suspects
-from rig.analysis.fit import Begun, DropFit, Fit, refit_at_rate, settle
+from rig.analysis.fit import Begun, DropFit, Fit, settle
 from rig.analysis.gravity import free_gravity
 from rig.analysis.identify import DropIdentity, identify, pattern_faults
 from rig.analysis.joint_fit import by_itself
 from rig.analysis.last_passages import last_passages
 from rig.analysis.result import GOOD, Audit, Deviation, DropResult
 from rig.analysis.verdict import is_wrong, judge, judge_record, verdict_of
-from rig.arrays import Array
 from rig.clock.calibration import TimeScale
 from rig.protocol.contact import at_contact
 from rig.protocol.protocol import Protocol, Run
-from rig.reasons import Reason, make_reason
+from rig.reasons import make_reason
 from rig.records import Drop
 from rig.threads import one_thread
 
@@ -46,9 +42,9 @@ class DropSummary:
     identified
         Identification of the edges, by the gates left out; empty for a damaged record.
     aside
-        Numbers of the gates left out; `None` if no fit converged.
-    x
-        Fitted unknowns, shape ``(unknowns,)``.
+        Numbers of the gates left out.
+    fitted
+        Fitted matches and unknowns; `None` if no fit converged.
     deviations
         `Measured.deviation` of each quantity, as a stored result does not contain these.
     """
@@ -57,8 +53,8 @@ class DropSummary:
     explained: bool
     result: DropResult
     identified: Mapping[tuple[int, ...], DropIdentity]
-    aside: tuple[int, ...] | None
-    x: Array
+    aside: tuple[int, ...]
+    fitted: Begun | None
     deviations: Mapping[str, Deviation | None]
 
     @property
@@ -87,8 +83,6 @@ class DropCase:
         The raw record.
     scale
         Calibration of its ticks.
-    components
-        Variance components; those of the protocol if not given.
     aside
         Numbers of the gates that are left out, see `rig.analysis.diagnoses.gates_too_low`.
     """
@@ -97,7 +91,6 @@ class DropCase:
     run: Run
     drop: Drop
     scale: TimeScale
-    components: Components | None = None
     aside: tuple[int, ...] = ()
 
     @one_thread
@@ -113,26 +106,24 @@ class DropCase:
         """
         readings = {} if before is None else {**before.identified}
         result, fit = self.read(readings, explain=explain)
-        aside, x = None, np.zeros(0)
+        aside, fitted = self.aside, None
         if fit is not None:
             if result.verdict in GOOD:
                 result = replace(result, gravity=free_gravity(fit))
             if fit.estimate.settled:
-                records, x = fit.model.records.values(), fit.x
+                records, fitted = fit.model.records.values(), fit.begun
                 aside = tuple(train.gate for record in records for train in record.aside)
         deviations = {name: value.deviation for name, value in result.quantities.items()}
-        return DropSummary(self.scale, explain, result, readings, aside, x, deviations)
+        return DropSummary(self.scale, explain, result, readings, aside, fitted, deviations)
 
     @one_thread
     def restore_drop(self, summary: DropSummary) -> DropFit | None:
         """Return the fitted drop of a summary; `None` if its fit did not converge."""
-        aside = summary.aside
-        if aside is None:
+        fitted = summary.fitted
+        if fitted is None:
             return None
-        case = replace(self._at_contact(), aside=aside)
-        begun = summary.identified[aside].begun
-        assert begun is not None
-        return DropFit(case._model(begun), begun.matches, summary.x)
+        case = replace(self._at_contact(), aside=summary.aside)
+        return DropFit(case._model(fitted.alpha), fitted.matches, fitted.x)
 
     @one_thread
     def read(
@@ -153,70 +144,67 @@ class DropCase:
             reasons = (make_reason("record_damaged", text=drop.damage),)
             return DropResult(self.run, drop.attempt, "void", reasons, Audit(), damaged=True), None
         case = stated = self._at_contact()
-        begun = stated._identify(readings).begun
-        while low := gates_too_low(self.protocol, case.records, begun):
+        fit = whole = stated._fit(readings)
+        while low := gates_too_low(case.protocol, case.records, fit):
             case = replace(case, aside=(*case.aside, *low))
-            begun = case._identify(readings, begun).begun
-            without = result, _ = case._judge(readings, explain=False)
+            fit = case._fit(readings, fit)
+            without = result, _ = case._judge(readings, fit, explain=False)
             if not is_wrong(result.reasons):
                 return without
-        return stated._judge(readings, explain=explain)
+        return stated._judge(readings, whole, explain=explain)
 
     def _at_contact(self) -> DropCase:
-        run, protocol = self.run, self.protocol
-        components = self.components or priors(protocol)
-        protocol = at_contact(protocol, run.incline_deg, run.impact)
-        return replace(self, protocol=protocol, components=components)
+        run = self.run
+        return replace(self, protocol=at_contact(self.protocol, run.incline_deg, run.impact))
 
     @cached_property
     def records(self) -> list[ChainRecord]:
         """Each chain with its edges."""
         return chain_records(self.protocol, self.run, self.drop, self.scale.hz, self.aside)
 
-    def _model(self, begun: Begun) -> DropModel:
-        about = self.scale.u, self.components, begun.alpha
-        return DropModel.of(self.protocol, self.records, *about)
+    def _model(self, alpha: float) -> DropModel:
+        return DropModel.of(self.protocol, self.records, self.scale.u, alpha)
 
-    def _identify(
-        self, readings: dict[tuple[int, ...], DropIdentity], before: Begun | None = None
-    ) -> DropIdentity:
+    def _identify(self, readings: dict[tuple[int, ...], DropIdentity]) -> DropIdentity:
         """Return the identification without the gates `aside`, at a rounded time scale."""
         rough, reading = replace(self, scale=self.scale.coarse()), readings.get(self.aside)
         if reading is None or reading.scale != rough.scale:
-            readings[self.aside] = reading = rough._identify_anew(before)
+            earliest = -math.inf if self.drop.fire_tick is None else 0.0
+            identification = identify(self.protocol, rough.records, rough.scale.u, earliest)
+            unlike = pattern_faults(identification, self.protocol.vocabulary)
+            drop = None if unlike else identification.drop
+            reading = DropIdentity(rough.scale, unlike, drop.begun if drop else None)
+            readings[self.aside] = reading
         return reading
 
-    def _identify_anew(self, before: Begun | None) -> DropIdentity:
-        """Identify the drop's edges; `before` is a fit of the same drop with more gates."""
+    def _fit(
+        self, readings: dict[tuple[int, ...], DropIdentity], before: Fit | None = None
+    ) -> Fit | None:
+        """Fit the drop if it is identified; `before` is a fit of the same drop with more gates."""
         if before is not None:
-            return DropIdentity(self.scale, {}, begun=settle(self._model(before), before.x).begun)
-        assert self.components is not None
-        about = self.protocol, self.records, self.scale.u, self.components
-        identification = identify(*about, -math.inf if self.drop.fire_tick is None else 0.0)
-        unlike = pattern_faults(identification, self.protocol.vocabulary)
-        fit = None if unlike else identification.fit
-        return DropIdentity(self.scale, unlike, fit.begun if fit else None)
+            return settle(self._model(before.model.alpha), before.x)
+        begun = self._identify(readings).begun
+        return begun and settle(self._model(begun.alpha), begun.x, begun.matches)
 
     def _judge(
-        self, readings: dict[tuple[int, ...], DropIdentity], *, explain: bool
+        self, readings: dict[tuple[int, ...], DropIdentity], fit: Fit | None, *, explain: bool
     ) -> tuple[DropResult, Fit | None]:
-        """Return the result and fit of an identified drop."""
+        """Return the drop's result and its fit, if that is good enough for values."""
         protocol, run, drop, records = self.protocol, self.run, self.drop, self.records
-        reading = readings[self.aside]
+        reading = readings.get(self.aside, DropIdentity(self.scale, {}))
         audit = _blank_audit(drop, records)
         unlike = {reason.text: reason for reason in reading.unlike.values()}.values()
         doubts = silent(protocol, records) if reading.unlike else ()
         reasons = (*judge_record(drop, audit), *unlike, *doubts)
         verdict = verdict_of(reasons)
-        if verdict == "void" or reading.begun is None:
+        if verdict == "void" or fit is None:
             if reading.unlike and explain:
                 if reading.explained is None:
-                    reading = replace(reading, explained=self._unlike_fall(reading))
+                    explainer = self._explainer(reading.scale, suspects(records))
+                    reading = replace(reading, explained=explainer.name_fault(None))
                     readings[self.aside] = reading
                 reasons = (*reasons, *(reading.explained or ()))
             return DropResult(run, drop.attempt, verdict, reasons, audit), None
-        begun = reading.begun
-        fit = refit_at_rate(self._model(begun), begun, self.scale.hz / reading.scale.hz)
         unmatched = unmatched_edges(fit)
         audit = audit.count(fit.match_count, count_unexplained(unmatched))
         joint = by_itself(fit)
@@ -249,15 +237,9 @@ class DropCase:
         )
         return result, fit
 
-    def _unlike_fall(self, reading: DropIdentity) -> tuple[Reason, ...]:
-        """Return set-up faults that would explain edges that match no fall."""
-        explainer = self._explainer(reading.scale, suspects(self.records))
-        return explainer.name_fault(None)
-
     def _explainer(self, scale: TimeScale, suspects: Suspects) -> Explainer:
-        assert self.components is not None
         premise = Premise(self.protocol, self.run, scale.hz, self.aside)
-        return Explainer(premise, thin(self.drop, scale.hz), scale.u, self.components, suspects)
+        return Explainer(premise, thin(self.drop, scale.hz), scale.u, suspects)
 
 
 def _blank_audit(drop: Drop, records: Sequence[ChainRecord]) -> Audit:

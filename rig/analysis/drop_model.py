@@ -73,7 +73,6 @@ class DropModel:
         components: Components | None = None,
         alpha: float | None = None,
     ) -> None:
-        assert protocol.gates is not None
         self.protocol = protocol
         self._kappa: float
         self.kappa_u: float
@@ -103,16 +102,14 @@ class DropModel:
         protocol: Protocol,
         records: Sequence[ChainRecord],
         clock_u: float,
-        components: Components | None = None,
         alpha: float | None = None,
     ) -> DropModel:
-        """Return a drop's model; parts that depend only on the condition are cached."""
+        """Return a drop's model with the protocol's priors; all but its edges is cached."""
         content = tuple(map(_expectations, records))
         return _model_of(_Condition(protocol, content, tuple(records))).copy_with(
             records={record.role: record for record in records},
             alpha=records[0].alpha if alpha is None else alpha,
             clock_u=clock_u,
-            components=components or priors(protocol),
         )
 
     def copy_with(self, **attributes: Any) -> DropModel:
@@ -145,15 +142,13 @@ class DropModel:
         record, scales = self.records[role], self.components
         sd = np.hypot(scales.floor, scales.departure if record.ratios is not None else 0.0)
         variance = sd**2 + (self.slopes[role].levels ** 2) @ self.unknowns.sd**2
-        about = self.protocol, record, self.pairings[role], self.clock_u, scales
+        about = self.protocol, record, self.pairings[role], self.clock_u
         return SideFall.of(*about, np.sqrt(variance))
 
     def under(self, protocol: Protocol) -> DropModel:
         """Return a copy with the priors of a protocol that differs in nothing else."""
         # Heights stay: they may be relative to a contact point of this drop alone.
         current, gates, level = self.protocol, self.protocol.gates, protocol.contact.level
-        assert protocol.gates is not None
-        assert gates is not None
         kappa, kappa_u = prior_air(protocol)
         return self.copy_with(
             components=priors(protocol),

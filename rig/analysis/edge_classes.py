@@ -89,7 +89,6 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
         Fitted drop, by itself or with the session.
     """
     model, x = drop.model, drop.x
-    assert model.protocol.gates is not None
     clock, gates, gravity = model.rate(x), model.protocol.gates.gates, model.protocol.gravity.value
     unmatched: list[UnmatchedEdge] = []
     for role, record in model.records.items():

@@ -145,6 +145,7 @@ class Evidence:
             their variances (zero) and degrees of freedom; shape ``(6, bins)``.
         """
         squares, speeds, loose = (np.concatenate(part) for part in zip(*self._edges, strict=True))
+        self._edges.clear()
         order, places = np.lexsort((speeds, loose)), np.arange(loose.size)
         changes = np.diff(loose[order], prepend=-1.0) != 0.0
         # A few bins give the same result as all edges.

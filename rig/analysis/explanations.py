@@ -21,7 +21,6 @@ import numpy as np
 
 from rig.analysis.annealing import LEAST, MISSED
 from rig.analysis.chain_records import ChainRecord, chain_records
-from rig.analysis.components import Components
 from rig.analysis.diagnoses import RIGHT
 from rig.analysis.drop_model import DropModel
 from rig.analysis.faults import Fault, Premise, Suspects, faults
@@ -29,9 +28,9 @@ from rig.analysis.fit import Fit, settle
 from rig.analysis.identify import (
     Reading,
     held_back,
+    identify,
     most_votes,
     possible,
-    read_quickly,
     weigh,
     well_read,
 )
@@ -40,6 +39,7 @@ from rig.analysis.score_test import scores
 from rig.analysis.unknowns import prior_air
 from rig.analysis.verdict import is_wrong
 from rig.arrays import Array
+from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, make_reason
 from rig.records import Drop
 
@@ -93,8 +93,6 @@ class Explainer:
         The raw record.
     clock_u
         Relative standard uncertainty of the time scale.
-    components
-        Variance components.
     suspects
         Gates and rods that the edges cast doubt on.
     """
@@ -102,7 +100,6 @@ class Explainer:
     stated: Premise
     drop: Drop
     clock_u: float
-    components: Components
     suspects: Suspects
     _votes: dict[Hashable, int] = field(default_factory=dict)
     """Cache of a side's votes: a fault of a side does not change those of the other."""
@@ -180,7 +177,7 @@ class Explainer:
         is_clear = any(cause.whole and cause.evidence > least for cause in causes)
         if is_clear and "stretch" in fit.model.unknowns:
             # The fall may depart from the equations, without a fault.
-            scales = self.components
+            scales = fit.model.components
             wider = replace(
                 scales, stretch=_BEYOND * scales.stretch, landed=_BEYOND * scales.landed
             )
@@ -189,10 +186,14 @@ class Explainer:
 
     def _read_alone(self, record: ChainRecord) -> float:
         """Return the evidence of a side by itself, for a drop that was not identified."""
-        reading = read_quickly(self.stated.protocol, [record], self.clock_u, self.components)
+        reading = self._read(self.stated.protocol, [record])
         if reading is None:
             return record.edge_count * math.log(MISSED)
         return self._evidence(reading, self.stated.hz)
+
+    def _read(self, protocol: Protocol, records: Sequence[ChainRecord]) -> Reading | None:
+        """Return the best reading near the stated values; quicker than all of `identify`."""
+        return identify(protocol, records, self.clock_u, batches=1).reading
 
     def _along(self, fit: Fit) -> Iterator[Explanation]:
         """Yield fits of the continuous faults with the largest gain by the score test."""
@@ -267,15 +268,14 @@ class Explainer:
             ]
             key = record.role, *scene, *edges
             if key not in self._votes:
-                self._votes[key] = most_votes(protocol, record, self.clock_u, self.components)
+                self._votes[key] = most_votes(protocol, record, self.clock_u)
             votes[n] = self._votes[key]
         return sum(votes) / max(1, expected), 2 * sum(votes) - expected
 
     def _afresh(self, fault: Fault, size: float) -> Iterator[Explanation]:
         """Identify the edges anew with a fault of some size, and yield it with its evidence."""
         premise = fault.change(self.stated, size)
-        records = self._records(premise)
-        reading = read_quickly(premise.protocol, records, self.clock_u, self.components)
+        reading = self._read(premise.protocol, self._records(premise))
         if reading is None:
             return
         fit, u, occam = reading.fit, 0.0, math.log(fault.ways or len(fault.sizes))

@@ -34,7 +34,6 @@ class Premise(NamedTuple):
     @property
     def gates(self) -> tuple[Gate, ...]:
         """The gates of the protocol."""
-        assert self.protocol.gates is not None
         return self.protocol.gates.gates
 
     def change(self, **fields: Any) -> Premise:
@@ -43,7 +42,6 @@ class Premise(NamedTuple):
 
     def with_gates(self, gates: Sequence[Gate]) -> Premise:
         """Return the premise with other gates."""
-        assert self.protocol.gates is not None
         return self.change(gates=replace(self.protocol.gates, gates=tuple(gates)))
 
 

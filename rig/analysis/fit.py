@@ -8,12 +8,21 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.analysis.adjust import Estimate, adjust
-from rig.analysis.annealing import matched
+from rig.analysis.annealing import PART, matched
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY
 from rig.arrays import Array, Index
 
 Matches = dict[str, Index]
+
+
+class Begun(NamedTuple):
+    """α, matches and unknowns of a drop, without its model."""
+
+    alpha: float
+    matches: Matches
+    x: Array
+
 
 CLOSE = 0.1
 """Length of a drop's last step in standard uncertainties; convergence is quadratic. With half of it
@@ -45,6 +54,11 @@ class DropFit:
     x: Array
 
     @property
+    def begun(self) -> Begun:
+        """What a fit of the drop at another time scale begins with."""
+        return Begun(self.model.alpha, self.matches, self.x)
+
+    @property
     def match_count(self) -> int:
         """Number of matched edges."""
         return sum(map(count_matched, self.matches.values()))
@@ -70,11 +84,6 @@ class Fit(DropFit):
     """A drop fitted by itself."""
 
     estimate: Estimate
-
-    @property
-    def begun(self) -> Begun:
-        """What another fit of the drop begins with."""
-        return Begun(self.model.alpha, self.matches, self.x, self.estimate.scatter)
 
 
 def settle(model: DropModel, x: Array, matches: Matches | None = None) -> Fit:
@@ -103,42 +112,26 @@ def settle(model: DropModel, x: Array, matches: Matches | None = None) -> Fit:
     return Fit(model, used, x, estimate)
 
 
-class Begun(NamedTuple):
-    """State of a drop's fit at a time scale, to fit it again at another."""
-
-    alpha: float
-    matches: Matches
-    x: Array
-    scatter: float
-
-
-def refit_at_rate(model: DropModel, begun: Begun, rate: float) -> Fit:
-    """Fit a drop again at a slightly different time scale, with the same matches.
-
-    Parameters
-    ----------
-    model
-        Model at the new time scale, with α of `begun`.
-    rate
-        Ratio of the new tick rate to the old.
-    """
-    x, clock = begun.x.copy(), model.unknowns["clock"]
-    x[clock] = (1.0 + x[clock]) * rate - 1.0
-    return alone(DropFit(model, begun.matches, x), begun.scatter)
-
-
-def alone(drop: DropFit, scatter: float = 1.0) -> Fit:
+def alone(drop: DropFit) -> Fit:
     """Fit a drop by itself from its present unknowns, with the same matches."""
-    estimate = adjust(drop.model, drop.matches, drop.x.copy(), done=CLOSE, scatter=scatter)
+    estimate = adjust(drop.model, drop.matches, drop.x.copy(), done=CLOSE)
     return Fit(drop.model, drop.matches, estimate.x, estimate)
 
 
-def match(model: DropModel, x: Array) -> Matches:
-    """Match all edges to rods, given the unknowns."""
+def match(model: DropModel, x: Array, *, late: bool = True) -> Matches:
+    """Match all edges to rods, given the unknowns.
+
+    Parameters
+    ----------
+    late
+        Whether also edges of rods that may have struck before, and are late by that.
+    """
     matches: Matches = {}
     for role, pairing in model.pairings.items():
         heights, speeds = model.trajectory(role, x).heights(pairing.times * model.rate(x))
-        matches[role] = pairing.match(model.all_levels(role, x), heights, speeds, _FINE)
+        sd = np.hypot(_FINE, late * model.components.landed * model.expected[role].landed)
+        sd = np.minimum(sd, model.records[role].pitch / PART)
+        matches[role] = pairing.match(model.all_levels(role, x), heights, speeds, sd)
     return matches
 
 

@@ -56,7 +56,6 @@ def gate_passages(fit: DropFit, measured: Callable[[Dual], Measured]) -> tuple[G
     if not model.protocol.one_object or "free" not in model.records:
         return ()
     gates = model.protocol.gates
-    assert gates is not None
     seen = {
         train.gate
         for train, _, match in model.records["free"].by_gate(fit.matches["free"])
@@ -78,7 +77,6 @@ def gate_passages(fit: DropFit, measured: Callable[[Dual], Measured]) -> tuple[G
 def moment(drop: AdjustedDrop, gate: Gate) -> tuple[Dual, Dual]:
     """Return the time and speed of the object's middle at the fitted height of a beam."""
     model, gates = drop.model, drop.model.protocol.gates
-    assert gates is not None
     beam, post = np.eye(len(gates.gates)), np.eye(len(gates.posts))
     level = gate.height + drop.linear("beams", beam[[gates.gates.index(gate)]])
     level += drop.linear("datum", post[[gates.posts.index(gate.side)]])

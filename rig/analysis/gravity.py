@@ -101,13 +101,13 @@ def free_gravity(fit: Fit) -> Measured | None:
     estimate, model, rows = fit.estimate, fit.model, fit.estimate.rows.get("free")
     if rows is None or model.protocol.surface is None:
         return None
-    edges, at = count_matched(fit.matches["free"]), model.unknowns["gravity"].start
+    edges, free = count_matched(fit.matches["free"]), rows.columns
     if edges < _FEWEST:
         return None
-    sd = estimate.sd.copy()
-    sd[at] = ANY_GRAVITY
-    rows, pull, share = rows.triangle(), model.unknowns.pull(estimate.x), 1.0
-    pull[at] = estimate.x[at] / ANY_GRAVITY
+    at = int(np.flatnonzero(free == model.unknowns["gravity"].start)[0])
+    x, sd, pull = estimate.x[free], estimate.sd[free], model.unknowns.pull(estimate.x)[free]
+    sd[at], pull[at], share = ANY_GRAVITY, x[at] / ANY_GRAVITY, 1.0
+    rows = rows._replace(columns=np.arange(free.size)).triangle()
     for _ in range(2):
         # Estimate the scatter from the residuals; the stated scatter counts as `STATED_WEIGHT`.
         rows = rows._replace(slopes=rows.slopes / share, left=rows.left / share)
@@ -118,7 +118,7 @@ def free_gravity(fit: Fit) -> Measured | None:
         share = math.sqrt(
             (STATED_WEIGHT + float(residuals @ residuals)) / (STATED_WEIGHT + degrees)
         )
-    value = model.protocol.gravity.value + float(estimate.x[at] + step[at] * sd[at])
+    value = model.protocol.gravity.value + float(x[at] + step[at] * sd[at])
     u = float(np.linalg.norm(inverse[at]) * sd[at])
     # Errors of beams, rods and clock are the same in every drop: averaging does not reduce them.
     return Measured(value, u, budget={"beam heights": u})

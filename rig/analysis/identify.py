@@ -28,10 +28,10 @@ from rig.analysis.annealing import (
     log_density,
 )
 from rig.analysis.chain_records import SIDES, ChainRecord
-from rig.analysis.components import Components
+from rig.analysis.distributions import most_by_chance
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY
-from rig.analysis.fit import Begun, Fit, count_matched, settle
+from rig.analysis.fit import Begun, DropFit, Fit, count_matched, settle
 from rig.arrays import Index
 from rig.clock.calibration import TimeScale
 from rig.protocol.gates import CLEARANCE_M
@@ -45,8 +45,6 @@ LEAD = math.log(1000.0)
 """Least log odds of a reading against the likeliest different one; below, a drop is ambiguous."""
 _CLEAR = 0.97
 """Matched share of the matchable edges above which no other start is tried."""
-_FAIR = 0.9
-"""Matched share of the matchable edges above which a reading is good."""
 RESTLESS = 2.0
 """Scatter of the edges, relative to the assumed scatter, above which a remark is made."""
 _CLOSE = 30.0
@@ -80,23 +78,29 @@ class Identification:
 
     Attributes
     ----------
-    fit
-        Fit of all sides; `None` if the edges of a side match no fall of its chain.
+    drop
+        Matches and first estimates; `None` if the edges of a side match no fall of its chain.
+        Fitted if there are rivals.
     shares
         Matched share of each side's expected edges, by role.
     log_odds
         Log odds against the best different reading; infinite if there is none.
-    evidence
-        As in `Reading`.
     other
         Fit of the best different reading, if it was fitted.
     """
 
-    fit: Fit | None
+    drop: DropFit | None
     shares: Mapping[str, float]
     log_odds: float = math.inf
-    evidence: float = -math.inf
     other: Fit | None = None
+
+    @property
+    def reading(self) -> Reading | None:
+        """The best reading, fitted; `None` like `drop`."""
+        drop = self.drop
+        if drop is None:
+            return None
+        return weigh(drop if isinstance(drop, Fit) else settle(drop.model, drop.x, drop.matches))
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +116,7 @@ class DropIdentity:
     unlike
         Reasons why the edges do not match a fall of each chain, by role; empty if they do.
     begun
-        The fitted fall; `None` if the drop was not identified.
+        Matches and first estimates; `None` if the drop was not identified.
     explained
         Set-up faults that would explain the edges; `None` if not searched for.
     """
@@ -127,7 +131,6 @@ def identify(
     protocol: Protocol,
     records: Sequence[ChainRecord],
     clock_u: float,
-    components: Components,
     earliest: float = -math.inf,
     batches: int | None = None,
 ) -> Identification:
@@ -139,14 +142,12 @@ def identify(
         The chains with their edges.
     clock_u
         Relative standard uncertainty of the time scale.
-    components
-        Variance components.
     earliest
         Earliest possible release, s since the release fired.
     batches
         Greatest number of batches of starts, the likeliest first; all if not given.
     """
-    model = DropModel.of(protocol, records, clock_u, components)
+    model = DropModel.of(protocol, records, clock_u)
     readings = {role: _read(model.side(role), earliest, batches) for role in model.records}
     # Evidence is relative to all edges being strays and every rod missed.
     if all(side and side[0].evidence > 0.0 for side in readings.values()):
@@ -167,7 +168,7 @@ def pattern_faults(
         for role, share in identification.shares.items()
         if share < LEAST
     }
-    if not reasons and identification.fit is None:
+    if not reasons and identification.drop is None:
         return dict.fromkeys(identification.shares, make_reason("no_fall", words))
     if not reasons and identification.log_odds < LEAD:
         odds = math.exp(identification.log_odds)
@@ -175,21 +176,10 @@ def pattern_faults(
     return reasons
 
 
-def read_quickly(
-    protocol: Protocol, records: Sequence[ChainRecord], clock_u: float, components: Components
-) -> Reading | None:
-    """Return the best reading near the stated values, or `None`; quicker than `identify`."""
-    identification = identify(protocol, records, clock_u, components, batches=1)
-    fit = identification.fit
-    return None if fit is None else Reading(fit, identification.evidence)
-
-
-def most_votes(
-    protocol: Protocol, record: ChainRecord, clock_u: float, components: Components
-) -> int:
+def most_votes(protocol: Protocol, record: ChainRecord, clock_u: float) -> int:
     """Return how many of a side's edges agree on a fall near the stated values, at most."""
     pairing = Pairing.of(record.trains, record.rebound_widths)
-    votes = SideFall.of(protocol, record, pairing, clock_u, components).most_votes()
+    votes = SideFall.of(protocol, record, pairing, clock_u).most_votes()
     return min(votes, possible(record))  # many edges of a flicker vote for the same rod
 
 
@@ -197,9 +187,16 @@ def well_read(fit: Fit) -> bool:
     """Whether nearly all matchable edges are matched, with usual scatter and unknowns in range."""
     matchable = sum(possible(record) for record in fit.model.records.values())
     expected = sum(record.edge_count for record in fit.model.records.values())
-    many = fit.match_count >= max(LEAST * max(1, expected), _FAIR * matchable)
+    missed = max(matchable, math.ceil(LEAST * expected)) - fit.match_count
+    whole = missed <= most_missed(fit.model.protocol, matchable)
     strain = float(np.abs(fit.model.unknowns.pull(fit.x)).max())
-    return many and fit.estimate.scatter < RESTLESS and strain < STRAY
+    return whole and fit.estimate.scatter < RESTLESS and strain < STRAY
+
+
+def most_missed(protocol: Protocol, expected: int) -> float:
+    """Return how many of the expected edges a drop may lack, by its limit or by chance."""
+    limit = protocol.accept.missed_edges
+    return max(limit * expected, most_by_chance(expected, min(MISSED, limit / 2.0)))
 
 
 def possible(record: ChainRecord) -> int:
@@ -274,29 +271,34 @@ def held_back(fit: Fit) -> float:
 
 
 def _together(model: DropModel, readings: Mapping[str, Sequence[FallFit]]) -> Identification:
-    """Fit the likeliest pairs of both sides' readings, and return the best with its odds."""
-    pairs = []
-    for pair in itertools.product(*readings.values()):
+    """Return the likeliest pair of both sides' readings with its odds; rivals are fitted first."""
+
+    def likely(pair: Sequence[FallFit]) -> float:
         together = _simultaneous(model.protocol, [side.values[RELEASE] for side in pair])
-        pairs.append((sum(side.evidence for side in pair) + together, pair))
-    pairs.sort(key=lambda row: -row[0])
-    likeliest = pairs[0][0]
-    close = [pair for likely, pair in pairs if likeliest - likely < _CLOSE][:PEAKS]
-    tried: list[Reading] = []
-    for pair in close:
-        sides = dict(zip(readings, pair, strict=True))
-        x = model.from_falls({role: side.values for role, side in sides.items()})
-        alpha = sides["impact"].values[ALPHA] if "impact" in sides else 0.0
-        matches = {role: side.match for role, side in sides.items()}
-        tried.append(weigh(settle(model.copy_with(alpha=alpha), x, matches)))
-    best, *rest = _rank_readings(tried)
-    shares = _shares(model, {role: count_matched(side) for role, side in best.fit.matches.items()})
-    if not best.evidence > 0.0:
-        return Identification(None, shares)
-    odds = best.evidence - rest[0].evidence if rest else math.inf
-    if len(pairs) > len(close):
-        odds = min(odds, likeliest - pairs[len(close)][0])
-    return Identification(best.fit, shares, odds, best.evidence, rest[0].fit if rest else None)
+        return sum(side.evidence for side in pair) + together
+
+    pairs = sorted(itertools.product(*readings.values()), key=likely, reverse=True)
+    likeliest = likely(pairs[0])
+    close = [pair for pair in pairs if likeliest - likely(pair) < _CLOSE][:PEAKS]
+    further = likeliest - likely(pairs[len(close)]) if len(pairs) > len(close) else math.inf
+    drops = [_begin(model, dict(zip(readings, pair, strict=True))) for pair in close]
+    best, evidence, odds, other = drops[0], likeliest, further, None
+    if len(drops) > 1:
+        tried = [weigh(settle(drop.model, drop.x, drop.matches)) for drop in drops]
+        likelier, *rest = _rank_readings(tried)
+        best, evidence = likelier.fit, likelier.evidence
+        if rest:
+            odds, other = min(further, evidence - rest[0].evidence), rest[0].fit
+    shares = _shares(model, {role: count_matched(side) for role, side in best.matches.items()})
+    return Identification(best if evidence > 0.0 else None, shares, odds, other)
+
+
+def _begin(model: DropModel, sides: Mapping[str, FallFit]) -> DropFit:
+    """Return a drop with the matches and unknowns of annealed falls."""
+    x = model.from_falls({role: side.values for role, side in sides.items()})
+    alpha = sides["impact"].values[ALPHA] if "impact" in sides else 0.0
+    matches = {role: side.match for role, side in sides.items()}
+    return DropFit(model.copy_with(alpha=alpha), matches, x)
 
 
 def _shares(model: DropModel, matched: Mapping[str, int]) -> dict[str, float]:
@@ -318,7 +320,7 @@ def _simultaneous(protocol: Protocol, releases: Sequence[float]) -> float:
     return -math.log1p(apart**2)
 
 
-def deciding_gate(likelier: Fit, rival: Fit) -> tuple[str, float]:
+def deciding_gate(likelier: DropFit, rival: DropFit) -> tuple[str, float]:
     """Return the place of a further beam that would best separate two falls.
 
     A beam does not identify rods, so each edge of a fall is compared with the nearest edge of the

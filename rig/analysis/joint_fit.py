@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -19,7 +19,7 @@ import numpy as np
 from rig.analysis.components import Components, priors
 from rig.analysis.equations import STRAY, Residuals, standardise
 from rig.analysis.evidence import Evidence
-from rig.analysis.fit import DropFit, Fit, without_strays
+from rig.analysis.fit import DropFit, Fit
 from rig.analysis.joint_step import DropGroup, JointDrop, group_drops, joint_step, with_priors
 from rig.analysis.likeness import Likeness, likeness
 from rig.analysis.plain_data import Record, attributes
@@ -175,7 +175,7 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
     damping = np.ones_like(previous)
     inverse, reduced = np.eye(size), list[Elimination]()
     for round_ in range(_ROUNDS):
-        reduced.clear()  # most of the memory
+        reduced.clear()  # of all drops, as `residuals`: most of the memory
         groups = with_priors([group.at(x) for group in groups], evidence.components)
         if round_ == _REMATCH:
             groups = [group.rematch() for group in groups]
@@ -191,6 +191,7 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
         before = evidence.components
         evidence = Evidence(before, beforehand)
         evidence.edges(residuals)
+        residuals.clear()
         _weigh(evidence, shared, x, sd, inverse, groups, reduced)
         # With linear convergence, the next step is shorter by the ratio of the last two.
         settled = round_ > _REMATCH and (moved < _DONE or moved**2 < _DONE * last)
@@ -203,12 +204,9 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
         if round_ > _REMATCH:
             damping[ahead * previous < 0.0] *= 0.5
         previous = ahead
-    good: dict[int, JointDrop] = {}
-    for group, part in zip(groups, reduced, strict=True):
-        for n, drop in zip(group.places, group.split(part), strict=True):
-            kept = without_strays(drop.model, drop.x, drop.matches)
-            good[n] = replace(drop, matches=kept)
-    drops = tuple(good[n] for n in sorted(good))
+    parts = zip(groups, reduced, strict=True)
+    placed = dict(drop for group, part in parts for drop in group.split(part))
+    drops = tuple(placed[n] for n in sorted(placed))
     # Return the components used for this solution, not the updated ones.
     return JointFit(shared, x, sd, inverse, before, evidence.degrees, drops, settled)
 

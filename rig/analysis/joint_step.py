@@ -15,7 +15,7 @@ from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import Components
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY, Seen, linearize, standardise
-from rig.analysis.fit import DropFit, Matches, match
+from rig.analysis.fit import DropFit, Matches, match, without_strays
 from rig.analysis.square_root import (
     Elimination,
     EquationRows,
@@ -101,12 +101,15 @@ class DropGroup:
         matches = [match(model, x) for model, x in zip(models, self.x, strict=True)]
         return replace(self, matches=matches, edges=_edges(models, matches, self.x))
 
-    def split(self, reduced: Elimination) -> Iterator[JointDrop]:
-        """Yield each drop, with its own unknowns eliminated."""
+    def split(self, reduced: Elimination) -> Iterator[tuple[int, JointDrop]]:
+        """Yield each drop with its place, its own unknowns eliminated, and without strays."""
         places = self.own, self.common, self.here
-        drops = zip(self.records, self.matches, self.x, *reduced[:2], strict=True)
-        for records, matches, x, inverse, gain in drops:
-            yield JointDrop(self.model.with_edges(records), matches, x, *places, inverse, gain)
+        drops = zip(self.places, self.records, self.matches, self.x, *reduced[:2], strict=True)
+        for n, records, matches, x, inverse, gain in drops:
+            kept = without_strays(self.model.with_edges(records), x, matches)
+            # The model anew: what it prepared of its edges takes more memory than all else.
+            model = self.model.with_edges(records)
+            yield n, JointDrop(model, kept, x, *places, inverse, gain)
 
 
 def group_drops(fits: Sequence[DropFit], shared: SharedUnknowns) -> list[DropGroup]:

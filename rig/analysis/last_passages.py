@@ -43,13 +43,12 @@ def last_passages(fit: Fit) -> dict[str, Measured]:
     root = square_root(
         [*{**estimate.rows, "impact": end}.values()], sd, model.unknowns.pull(estimate.x)
     )
-    step, inverse = root.step(), np.linalg.inv(root.matrix)
-    drop, values = AdjustedDrop(model, estimate.x), {}
+    step, drop, values = root.step(), AdjustedDrop(model, estimate.x), dict[str, Measured]()
     for name in CODES:
         value = COMPUTED[name](drop)
         if value is not None:
             slopes = value.slopes * sd
-            u = float(np.linalg.norm(slopes @ inverse))
+            u = float(np.linalg.norm(np.linalg.solve(root.matrix.T, slopes)))
             values[name] = Measured(float(value.value + slopes @ step), u)
     return values
 

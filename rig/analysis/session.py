@@ -23,7 +23,7 @@ from rig.analysis.result import GOOD, DropResult
 from rig.analysis.summary import Incline, summarize
 from rig.analysis.verdict import nearly_in_time, release_reasons, verdict_of
 from rig.clock.calibration import TimeScale
-from rig.protocol.measurable import check_gates, check_measurable
+from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Protocol, Run
 from rig.reasons import Reason, make_reason, rig_error
@@ -172,7 +172,6 @@ def analyze(
     InputError
         A drop of a run that is not planned, or a scene that cannot be measured.
     """
-    check_gates(protocol)
     check_measurable(protocol)
     known: SummaryByDrop = {} if summaries is None else summaries
     total = total or length_hint(drops)

@@ -49,7 +49,6 @@ class Side(NamedTuple):
     @property
     def gates(self) -> Gates:
         """Photogates of the scene."""
-        assert self.protocol.gates is not None
         return self.protocol.gates
 
     @property

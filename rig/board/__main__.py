@@ -12,7 +12,7 @@ import time
 from select import select
 from typing import Any
 
-from rig.board.page import SCRIPT_DIGEST, BoardPage
+from rig.board.page import BoardPage
 from rig.board.server import PageServer
 
 _NICE = 5
@@ -22,7 +22,8 @@ _RESTS = 25.0  # times as long as it worked, or it would cost more than 4 % of a
 
 def serve(address: str, listener: socket.socket) -> None:
     """Serve the page until the daemon has ended, which its line tells."""
-    page, server, news = BoardPage(address), PageServer(listener, SCRIPT_DIGEST), dict[str, Any]()
+    page, news = BoardPage(address), dict[str, Any]()
+    server = PageServer(listener, page.digest)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     due_s = 0.0
     while True:

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping
 from dataclasses import replace
-from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -15,18 +13,14 @@ from rig.board.process import is_local
 from rig.errors import RigError
 from rig.files import file_stamp
 from rig.records import Job
-from rig.report import looks
 from rig.report.figure import COLUMN_PT, Chart
 from rig.report.figures import result_figure
-from rig.report.templates import render
+from rig.report.templates import environment, read_script
 from rig.results.live import LiveAnalysis, SessionView
 from rig.tui.drop_words import LOOKS, headline, past_runs, sentence
 from rig.tui.motion import motions
 
 _NOW = {"armed": " · is armed", "fired": " · falls"}
-_HERE = Path(__file__).parent
-SCRIPT = (_HERE / "board.js").read_text("utf-8")
-SCRIPT_DIGEST = f"sha256-{base64.b64encode(sha256(SCRIPT.encode()).digest()).decode()}"
 
 
 class BoardPage:
@@ -36,23 +30,24 @@ class BoardPage:
     ----------
     address
         Where browsers find it.
+
+    Attributes
+    ----------
+    digest
+        Of its only script, as a security policy has it.
     """
 
     def __init__(self, address: str) -> None:
-        from jinja2 import ChainableUndefined, Environment, FileSystemLoader  # noqa: PLC0415 - pages only
+        from jinja2 import ChainableUndefined  # noqa: PLC0415 - pages only
 
         self._live: LiveAnalysis | None = None
         self._seen: object = None
         self._drawn: tuple[object, dict[str, Any]] = None, {}
-        loader = FileSystemLoader(_HERE)
-        templates = Environment(loader=loader, autoescape=True, undefined=ChainableUndefined)
-        always = {
-            "address": address,
-            "code": "" if is_local(address) else _qr_code(address),
-            "css": f"{render('figure.css', looks=looks)}{(_HERE / 'board.css').read_text('utf-8')}",
-            "script": SCRIPT,
-        }
+        code = "" if is_local(address) else _qr_code(address)
+        always = {"address": address, "code": code, **read_script("board.js")}
+        templates = environment().overlay(undefined=ChainableUndefined)
         self._template = templates.get_template("board.html", globals=always)
+        self.digest = always["digest"]
 
     def look(self, news: Mapping[str, Any]) -> str | None:
         """Return the page as it is now; `None` where nothing has changed.

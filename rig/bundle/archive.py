@@ -20,6 +20,7 @@ from rig import __version__
 from rig.errors import RigError
 from rig.files import read_input
 from rig.reasons import rig_error
+from rig.text_rows import read_text
 
 ROOT = "record/"
 """The one folder of the archive."""
@@ -65,7 +66,7 @@ def seal(files: Mapping[str, bytes], about: Mapping[str, str]) -> dict[str, byte
         }
         for name, content in sorted(files.items())
     ]
-    crate = json.loads(Path(__file__).with_name("crate.json").read_text("utf-8"))
+    crate = json.loads(read_text(__file__, "crate.json"))
     _, root, program, *_ = crate["@graph"]
     program["version"] = __version__
     root |= {**about, "hasPart": [{"@id": file["@id"]} for file in described]}

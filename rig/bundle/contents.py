@@ -7,18 +7,16 @@ from __future__ import annotations
 
 import json
 import math
-import platform
 import re
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing
-from importlib.metadata import version
 from typing import Any
 
-from rig import __version__
 from rig.bundle.archive import CRATE, SUMS, seal, to_json
 from rig.bundle.means import mean_tables
 from rig.bundle.tables import csv_files, data_package
+from rig.cache.entry import environment
 from rig.results.whole import SessionResults, protocol_of
 from rig.session.faults import translate_errors
 from rig.session.reading import Reader
@@ -90,7 +88,7 @@ def bundle_files(
         **drawn,
         "tables/datapackage.json": to_json(data_package(tables)),
         RESULTS: to_json(results.json()),
-        ENVIRONMENT: to_json(_environment()),
+        ENVIRONMENT: to_json(environment()),
         SESSION: data,
     }
     for number, attached in enumerate(session.attached_files(), 1):
@@ -103,18 +101,6 @@ def bundle_files(
         "datePublished": session.meta["created"],  # the only date: no other would come again
     }
     return seal(files, about)
-
-
-def _environment() -> dict[str, str]:
-    """Return the versions that numbers depend on."""
-    return {
-        "rig": __version__,
-        **{package: version(package) for package in ("numpy", "scipy", "matplotlib")},
-        "python": platform.python_version(),
-        "sqlite": sqlite3.sqlite_version,
-        "system": platform.system(),
-        "machine": platform.machine(),
-    }
 
 
 def compare(stored: Mapping[str, bytes], derived: Mapping[str, bytes]) -> Iterator[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Container, Iterable, Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.bundle.archive import sha256
@@ -12,7 +11,7 @@ from rig.measurands import MEASURANDS
 from rig.reasons import sentences
 from rig.session.reading import Reader
 from rig.session.schema import TABLES
-from rig.text_rows import read_rows
+from rig.text_rows import read_rows, read_text
 from rig.text_table import csv_text
 from rig.timers.edge_rows import HEADER, edges_text
 
@@ -157,7 +156,7 @@ def _columns(rows: Iterable[Mapping[str, object]]) -> Sequence[str]:
 
 def _readme(session: Reader, described: Mapping[str, Sequence[str]]) -> str:
     lines = ["SIMULATED DATA: nothing fell.", ""] if session.simulated else []
-    head = Path(__file__).with_name("readme.txt").read_text("utf-8")
+    head = read_text(__file__, "readme.txt")
     lines += head.format(source=session.protocol_source, **session.meta).splitlines()
     for name, columns in sorted(described.items()):
         lines += ["", name, *(f"  {column}{_describe(name, column)}" for column in columns)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import platform
+import sqlite3
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
@@ -11,12 +12,11 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Generic, TypeVar
 
+from rig import __version__
 from rig.cache.plain import from_text, to_text
 from rig.cache.store import CacheFolder
 
 Kept = TypeVar("Kept")
-
-_NUMERICS = ("numpy", "scipy", "matplotlib")
 
 
 class CacheEntry(Generic[Kept]):
@@ -78,6 +78,18 @@ def recall(
     return entry.keep(make()) if answer is None else answer
 
 
+def environment() -> dict[str, str]:
+    """Return the versions that numbers depend on."""
+    return {
+        "rig": __version__,
+        **{package: version(package) for package in ("numpy", "scipy", "matplotlib")},
+        "python": platform.python_version(),
+        "sqlite": sqlite3.sqlite_version,
+        "system": platform.system(),
+        "machine": platform.machine(),
+    }
+
+
 @cache
 def _program() -> str:
     """Tell this program, by its files and those it computes with, and this computer from others.
@@ -94,6 +106,5 @@ def _program() -> str:
         if path.suffix != ".pyc":
             digest.update(f"{path.relative_to(root)}\0".encode())
             digest.update(path.read_bytes())
-    surroundings = [platform.python_version(), platform.machine(), platform.node()]
-    digest.update(repr(surroundings + [version(package) for package in _NUMERICS]).encode())
+    digest.update(repr((environment(), platform.node())).encode())
     return digest.hexdigest() if Path(__file__).is_file() else ""

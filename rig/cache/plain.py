@@ -44,7 +44,7 @@ def from_text(text: str) -> Any:
     """
     try:
         return _record(json.loads(text))
-    except (AttributeError, ImportError, LookupError, TypeError) as error:
+    except (AttributeError, ImportError, LookupError, RecursionError, TypeError) as error:
         raise ValueError(f"no kept result: {error}") from error
 
 

@@ -75,18 +75,20 @@ class CacheFolder:
     def size(self) -> CacheSize | None:
         """Return how much is kept; `None` where no cache can be used."""
         with suppress(OSError):
-            sizes = [file.stat().st_size for part in self._parts() for file in part.iterdir()]
+            sizes = [file.stat().st_size for file in self._kept_files()]
             return CacheSize(len(sizes), sum(sizes))
         return None
 
     def clear(self) -> None:
         """Forget everything; other files of the folder, such as a daemon's socket, stay."""
         with suppress(OSError):
-            for part in self._parts():
-                shutil.rmtree(part)
+            for file in self._kept_files():
+                file.unlink(missing_ok=True)
 
-    def _parts(self) -> list[Path]:
-        return [*self._private_folder().glob("[0-9a-f]")]
+    def _kept_files(self) -> list[Path]:
+        """Return all files of results, with the database in which an earlier version kept them."""
+        folder = self._private_folder()
+        return [*folder.glob("[0-9a-f]/*"), *folder.glob("results.sqlite*")]
 
     def _file(self, key: str) -> Path:
         name = sha256(key.encode()).hexdigest()

@@ -5,7 +5,7 @@ from rig.commands.output import Arguments, print_data
 from rig.predictions import notes
 from rig.protocol import reader
 from rig.protocol.describe import describe
-from rig.protocol.measurable import check_gates, check_recordable, unmeasurable
+from rig.protocol.measurable import check_gates, check_recordable
 from rig.protocol.protocol import Protocol
 
 
@@ -17,19 +17,20 @@ def main(arguments: Arguments) -> None:
         print_data(schema(), [page().rstrip()], as_json=arguments.schema)
         return
     protocol = reader.read(arguments.protocol)
-    if arguments.board:
+    if arguments.board and protocol.gates:
         check_recordable(protocol, BOARDS[arguments.board])
     if arguments.output:
         from rig.report import canvas, mounting  # noqa: PLC0415 - matplotlib, only here
 
-        figure = mounting.mounting_figure(protocol, check_gates(protocol))
+        check_gates(protocol)
+        figure = mounting.mounting_figure(protocol)
         canvas.write_figure(arguments.output, figure)
     print(describe(protocol, [*notes(protocol), *_trials(protocol)]))
 
 
 def _trials(protocol: Protocol) -> list[str]:
     """Say how many simulated drops the gates of a protocol identify, if it can be measured."""
-    if protocol.gates is None or not protocol.gates.gates or unmeasurable(protocol):
+    if protocol.thrown or not protocol.gates:
         return []
     from rig.design.trials import trials, trials_text  # noqa: PLC0415 - numpy, only with gates
 

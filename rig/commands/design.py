@@ -12,7 +12,7 @@ from rig.design.search import better, room
 from rig.design.trials import readable, trials, trials_text
 from rig.files import write_atomic
 from rig.protocol import reader
-from rig.protocol.measurable import check_gates, check_measurable
+from rig.protocol.measurable import check_measurable
 from rig.protocol.protocol import Protocol
 from rig.reasons import rig_error
 from rig.report.design import design_lines
@@ -22,7 +22,6 @@ def main(arguments: Arguments) -> None:
     """Predict the uncertainties of a layout, and search for a better layout."""
     protocol = reader.read(arguments.protocol)
     check_measurable(protocol)
-    check_gates(protocol)
     if arguments.repeats is not None:
         protocol = replace(protocol, plan=replace(protocol.plan, repeats=arguments.repeats))
     learned = arguments.learned
@@ -66,7 +65,7 @@ def _forecast(protocol: Protocol, components: Components) -> dict[str, Any]:
     return {
         "gates": [
             {"channel": gate.channel, "side": gate.side, "height_m": gate.height}
-            for gate in check_gates(protocol).gates
+            for gate in protocol.gates.gates
         ],
         "readable": readable(protocol),
         "trials": {"drops": outcome.drops, "read": outcome.read, "text": words},

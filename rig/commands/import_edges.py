@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 
 from rig.analysis.chain_records import chain_records
-from rig.analysis.components import priors
 from rig.analysis.drop import DropCase
 from rig.analysis.gravity import check_gravity
 from rig.analysis.identify import log_evidence, most_votes
@@ -18,7 +17,7 @@ from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.clock.host import SystemClock
 from rig.commands.output import Arguments, say
 from rig.protocol import reader
-from rig.protocol.measurable import check_gates, check_measurable, with_gates
+from rig.protocol.measurable import check_measurable, with_channels
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
 from rig.reasons import make_reason, reasons_json
@@ -41,6 +40,7 @@ of how long they last, so that those that are least like the others are among th
 def main(arguments: Arguments) -> None:
     """Make a session from a file, or say how it would be read."""
     protocol = reader.read(arguments.protocol)
+    check_measurable(protocol)
     source, events = Path(arguments.protocol).name, Path(arguments.events).name
     imported = import_with_protocol(protocol, arguments)
     drops = imported.drops
@@ -72,7 +72,7 @@ def main(arguments: Arguments) -> None:
 
 def import_with_protocol(protocol: Protocol, arguments: Arguments) -> Import:
     """Read the drops of any timer's file as a protocol's falls bear them out."""
-    gates = sorted(check_gates(protocol).gates, key=lambda gate: -gate.height)
+    gates = sorted(protocol.gates.gates, key=lambda gate: -gate.height)
     bars = max(side.chain.rods for side in protocol.chains.values())
     channels = [gate.channel for gate in gates]
     return import_drops(channels, bars, arguments, partial(fit_falls, protocol))
@@ -82,7 +82,7 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
     """Compare the first drops with falls that the protocol has."""
     planned = {run.number: run for run in runs(protocol)}
     # Of gates that the file does not have nothing is due.
-    protocol = with_gates(protocol, {*reading.channel.tolist()})
+    protocol = with_channels(protocol, {*reading.channel.tolist()})
     near, expected, evidence, gravity = 0, 0, 0.0, list[float]()
     shares, results = [(1.0, 0)], list[DropResult]()
     rate = TimeScale(TICK_HZ, RESONATOR_TOLERANCE)
@@ -93,7 +93,7 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
     for n in sorted({*order[:: 1 + len(order) // _MOST], *order[-1:]}):
         run, drop = planned[reading.runs[n]], reading.drop(n)
         records = chain_records(protocol, run, drop, TICK_HZ)
-        votes = sum(most_votes(protocol, record, rate.u, priors(protocol)) for record in records)
+        votes = sum(most_votes(protocol, record, rate.u) for record in records)
         due = sum(record.edge_count for record in records)
         # A single edge is near one of some fall, whenever that began.
         shares.append((votes / max(2, len(drop.edges), due), n))
@@ -113,11 +113,9 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
 
 def _check_plan(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:
     """Refuse runs that are not planned; remark on channels that are not gates."""
-    gates = check_gates(protocol)
-    check_measurable(protocol)
     planned = len(runs(protocol))
     if run := min((drop.run for drop in drops if drop.run > planned), default=0):
         raise refusal(source, "run_not_planned", run=run, planned=planned)
-    edges = (edge for drop in drops for edge in drop.edges)
-    if idle := sorted({edge.channel for edge in edges if not gates.mask >> edge.channel & 1}):
+    used = {edge.channel for drop in drops for edge in drop.edges}
+    if idle := sorted(used - {gate.channel for gate in protocol.gates.gates}):
         say(make_reason("channels_unused", channels=", ".join(map(str, idle))).text)

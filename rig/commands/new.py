@@ -21,11 +21,11 @@ from rig.report.mounting import mounting_figure
 from rig.report.wiring import wiring_drawing
 from rig.runner import Operator, run_protocol
 from rig.streams import ask, say
-from rig.text_rows import read_rows
+from rig.text_rows import read_rows, read_text
 
 _SIZES = ("gates", "rods", "length", "diameter", "drop", "repeats")
 """Answers that a draft takes as they are."""
-_CHOICE = Path(__file__).with_name("choose.txt").read_text("utf-8")
+_CHOICE = read_text(__file__, "choose.txt")
 """What somebody has, the ready protocol for it, and the command; README begins with it too."""
 
 
@@ -38,9 +38,8 @@ def main(arguments: Arguments) -> int:
     text = draft_text(draft)
     protocol = reader.parse(text, str(path))
     check_recordable(protocol, BOARDS.get(board))
-    assert protocol.gates is not None
     texts: dict[str, str | bytes] = {"protocol": text}
-    texts["mounting"] = figure_file(mounting_figure(protocol, protocol.gates), "svg")
+    texts["mounting"] = figure_file(mounting_figure(protocol), "svg")
     if board in BOARDS:
         texts["wiring"] = wiring_drawing(protocol, board)
     with ExitStack() as undo:  # a disk that is full half-way is left as it was

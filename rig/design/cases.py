@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,9 +17,8 @@ from rig.analysis.unknowns import SharedUnknowns
 from rig.arrays import Array, Index
 from rig.estimate.hypotheses import model_alpha
 from rig.protocol.contact import at_contact
-from rig.protocol.measurable import check_gates
 from rig.protocol.plan import runs
-from rig.protocol.protocol import Gate, Protocol, Run
+from rig.protocol.protocol import Protocol, Run
 from rig.records import Drop
 from rig.threads import one_thread
 
@@ -73,11 +72,6 @@ class Case:
         """Return what a beam says, if its own unknowns have this place among those of beams."""
         rows = self.blocks[beam]
         return rows._replace(columns=rows.columns + BEAM * place * (rows.columns >= self.core))
-
-
-def with_gates(protocol: Protocol, gates: Iterable[Gate]) -> Protocol:
-    """Return a protocol with other gates."""
-    return replace(protocol, gates=replace(check_gates(protocol), gates=tuple(gates)))
 
 
 @one_thread

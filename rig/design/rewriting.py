@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 
-from rig.protocol.measurable import check_gates
 from rig.protocol.protocol import SIDES, Protocol
 from rig.protocol.reader import parse
 from rig.protocol.yamltree import load, place_of
@@ -27,11 +26,10 @@ def rewrite_heights(protocol: Protocol) -> str:
     InputError
         Where the text does not say heights one by one.
     """
-    gates = check_gates(protocol)
     root, lines = load(protocol.text, protocol.source), protocol.text.splitlines(keepends=True)
     changes: list[tuple[int, int, float]] = []
     for side in SIDES:
-        for n, gate in enumerate(gates.on(side)):
+        for n, gate in enumerate(protocol.gates.on(side)):
             place = place_of(root, "gates", side, n, "height")
             changes.append((place.line - 1, place.column - 1, gate.height))
     for line, column, height in sorted(changes, reverse=True):  # from behind: places stay true
@@ -40,10 +38,10 @@ def rewrite_heights(protocol: Protocol) -> str:
         if value is not None:
             lines[line] = f"{text[:column]}{height * 1e3:.1f} mm{text[value.end() :]}"
     text = "".join(lines)
-    written = check_gates(parse(text, protocol.source))
+    written = parse(text, protocol.source).gates
     if any(
         abs(gate.height - meant.height) > _ROUNDED
-        for gate, meant in zip(written.gates, gates.gates, strict=True)
+        for gate, meant in zip(written.gates, protocol.gates.gates, strict=True)
     ):
         raise rig_error("heights_unwritten", protocol=protocol.source)
     return text

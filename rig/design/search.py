@@ -15,12 +15,11 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.analysis.components import Components
-from rig.design.cases import cases, with_gates
+from rig.design.cases import cases
 from rig.design.forecast import GateLayout, forecast
 from rig.design.trials import MARGIN, margin
 from rig.measurands import averaged
 from rig.protocol.gates import blocking_rod, hanging_rods
-from rig.protocol.measurable import check_gates
 from rig.protocol.protocol import Gate, Gates, Protocol
 from rig.threads import one_thread
 
@@ -54,7 +53,7 @@ class Room(NamedTuple):
 
 def room(protocol: Protocol, lowest: float | None, highest: float | None, spacing: float) -> Room:
     """Take limits as they are given, else from the gates that are there and the chains."""
-    heights = [gate.height for gate in check_gates(protocol).gates]
+    heights = [gate.height for gate in protocol.gates.gates]
     top = min(protocol.drop.value + rods.chain.length for rods in protocol.chains.values())
     lowest = min(heights) if lowest is None else lowest
     highest = max(heights) if highest is None else highest
@@ -90,12 +89,12 @@ def better(
     say
         Told how far it is.
     """
-    present, heights = check_gates(protocol), candidates(protocol, limits)
+    present, heights = protocol.gates, candidates(protocol, limits)
     gates = [*present.gates, *(Gate(0, z, side) for side in present.posts for z in heights)]
     inclines = sorted(protocol.plan.inclines)
     few = {inclines[round(n * (len(inclines) - 1) / (FEW - 1))] for n in range(FEW)}
     fewer = replace(protocol, plan=replace(protocol.plan, inclines=tuple(few)))
-    all_cases = cases(with_gates(fewer, gates), components)
+    all_cases = cases(fewer.with_gates(gates), components)
     layout = list(range(len(present.gates)))
     # Where the layout that is there is itself hard to read, one that is no harder will do.
     floor = min(MARGIN, margin(protocol))
@@ -122,14 +121,14 @@ def better(
                         continue
                     # Only now: whether it can be read takes a few drops to be read.
                     numbers = *layout[:slot], n, *layout[slot + 1 :]
-                    proposed = with_gates(protocol, (gates[number] for number in numbers))
+                    proposed = protocol.with_gates(gates[number] for number in numbers)
                     if _see_before(protocol, proposed) and margin(proposed) >= floor:
                         best, layout[slot] = trial, n
         ratio = math.exp(best - present_score)
         say(f"sweep {sweep}: uncertainties × {ratio:.3g} in the geometric mean")
         if before - best < _WORTH:
             break
-    return with_gates(protocol, _in_order(present, [gates[n] for n in layout]))
+    return protocol.with_gates(_in_order(present, [gates[n] for n in layout]))
 
 
 def _see_before(protocol: Protocol, proposed: Protocol) -> bool:
@@ -138,7 +137,7 @@ def _see_before(protocol: Protocol, proposed: Protocol) -> bool:
     With fewer, one missed edge too many leaves the fall open.
     """
     before, after = (
-        Counter(gate.side for gate in check_gates(p).gates if gate.height > protocol.drop.value)
+        Counter(gate.side for gate in p.gates.gates if gate.height > protocol.drop.value)
         for p in (protocol, proposed)
     )
     enough = (after[side] >= min(number, _BEFORE) for side, number in before.items())

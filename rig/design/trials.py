@@ -79,14 +79,13 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
         identification, wrong = read_drop(protocol_here, fallen, 0.0)
         read += not wrong
         failing.update(wrong)
-        if wrong and not further_gate and identification.fit and identification.other:
-            further_gate = deciding_gate(identification.fit, identification.other)
+        if wrong and not further_gate and identification.drop and identification.other:
+            further_gate = deciding_gate(identification.drop, identification.other)
     return Trials(drops, read, tuple(failing.items()), further_gate)
 
 
 def _fall(protocol: Protocol, run: Run, rng: np.random.Generator) -> list[ChainRecord]:
     """Let chains fall that hang and are let go a little off, with impulses that scatter."""
-    assert protocol.gates is not None
     model, x = predict_drop(protocol, run, priors(protocol))
     at, sd, fallen = model.unknowns, model.unknowns.sd, []
 
@@ -130,11 +129,11 @@ def read_drop(
     earliest
         When chains were let go at the earliest, s.
     """
-    identification = identify(protocol, records, CLOCK_U, priors(protocol), earliest)
+    identification = identify(protocol, records, CLOCK_U, earliest)
     unlike = list(pattern_faults(identification))
-    if unlike or identification.fit is None:
+    if unlike or identification.drop is None:
         return identification, unlike or [record.role for record in records]
-    matches = identification.fit.matches
+    matches = identification.drop.matches
     return identification, [
         record.role
         for record in records
@@ -159,7 +158,7 @@ def margin(protocol: Protocol) -> float:
         for off in (-_OFF, _OFF):
             x[model.unknowns["drop"]] = off * protocol.drop.u
             identification, unclear = read_drop(here, perfect(model, x))
-            if identification.fit is None or unclear:
+            if identification.drop is None or unclear:
                 return -math.inf
             least = min(least, identification.log_odds)
     return least

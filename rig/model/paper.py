@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import accumulate, pairwise, product
 from operator import mul
-from pathlib import Path
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from rig.model.continuum import UniformChain, end, separation_leading_order, spe
 from rig.model.fall import Fall, Hit, fall, free_leg, hits, kicks
 from rig.model.impact import Impact, alpha_inclined, alpha_level, impact_on
 from rig.model.surface import Pile, Surface
+from rig.text_rows import read_text
 from rig.units import Quantity
 
 Columns = dict[str, list[float]]
@@ -152,7 +152,7 @@ def claims() -> dict[int | None, dict[str, str]]:
         "graded": [100 * z for z in (MEASURED_GRADED_SEPARATION, separations[-1], early)],
     }
     by_figure: dict[int | None, dict[str, str]] = {}
-    for line in Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines():
+    for line in read_text(__file__).splitlines():
         number, claim, equations = line.format_map(values).split(" | ")
         figure = int(number) if number.isdigit() else None
         by_figure.setdefault(figure, {})[claim] = equations

@@ -104,13 +104,11 @@ def at_contact(protocol: Protocol, incline_deg: float, struck: str | None) -> Pr
     level = contact_level(protocol, incline_deg, struck)
     if not protocol.contact.from_board and not level.value:
         return protocol
-    gates = protocol.gates
-    if gates is not None:
-        lower = (
-            replace(gate, height=gate.height - level.value, stated=gate.height)
-            for gate in gates.gates
-        )
-        gates = replace(gates, gates=tuple(lower))
+    lower = (
+        replace(gate, height=gate.height - level.value, stated=gate.height)
+        for gate in protocol.gates.gates
+    )
     drop = Quantity(protocol.drop.value - level.value, protocol.drop.u)
     contact = replace(protocol.contact, level=Quantity(0.0, level.u))
-    return replace(protocol, drop=drop, gates=gates, contact=contact, stated=protocol)
+    lowered = protocol.with_gates(lower)
+    return replace(lowered, drop=drop, contact=contact, stated=protocol)

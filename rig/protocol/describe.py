@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise, product
-from pathlib import Path
 from string import Formatter
 from typing import Any
 
@@ -19,12 +18,12 @@ from rig.protocol.contact import touching_heights
 from rig.protocol.fields import DEFAULTS
 from rig.protocol.keys import SECTIONS, range_of
 from rig.protocol.plan import PATTERNS, runs
-from rig.protocol.protocol import AT_REST, STANDARD_GRAVITY, Protocol, RodChain
+from rig.protocol.protocol import STANDARD_GRAVITY, Protocol, RodChain
+from rig.text_rows import read_paragraphs
 from rig.units import UNITS, Quantity, format_quantity
 
 _EVEN = 1e-9  # m, tolerance for an even spacing
-_BLOCKS = Path(__file__).with_suffix(".txt").read_text("utf-8").strip().split("\n\n")[1:]
-_SECTIONS = {heading: rows for heading, *rows in (block.split("\n") for block in _BLOCKS)}
+_SECTIONS = {heading: rows for heading, *rows in read_paragraphs(__file__)}
 _STATED = [name for name in vars(Protocol) if not name.startswith("_")]
 Facts = Mapping[str, Any]
 
@@ -98,7 +97,6 @@ def _list_facts(protocol: Protocol) -> dict[str, Any]:
         "level": max(plan.inclines) == 0,
         "tilted": any(rods.tilt_deg for rods in chains),
         "standard": protocol.gravity == standard,
-        "thrown": protocol.initial_speed != AT_REST,
         "runs": len(planned),
         "several": len(planned) > 1,
         "angles": ", ".join(f"{angle:g}" for angle in plan.inclines),
@@ -106,7 +104,6 @@ def _list_facts(protocol: Protocol) -> dict[str, Any]:
         "share": sum(run.impact == first for run in planned),
         "period": period,
         "unbalanced": plan.repeats % period,
-        "unmeasurable": measurable.unmeasurable(protocol),
         "too_long": gates and measurable.too_long(protocol),
         "edges": measurable.most_edges(protocol),
         "recording": recording,
@@ -145,7 +142,7 @@ def _chain_facts(rods: RodChain) -> Facts:
 
 
 def _gate_facts(protocol: Protocol) -> Iterator[Facts]:
-    for gate in protocol.gates.gates if protocol.gates else ():
+    for gate in protocol.gates.gates:
         passing = measurable.passing_rods(protocol, gate)
         totals = ((name, protocol.chains[name].chain.rods, n) for name, n in passing.items())
         rods = ", ".join(f"{name} {total - n + 1}–{total}" for name, total, n in totals)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, replace
 from itertools import count, pairwise
-from pathlib import Path
 from string import Template
 from typing import Literal, get_args
 
@@ -13,6 +12,7 @@ from rig.errors import InputError
 from rig.protocol.keys import KEYS
 from rig.protocol.protocol import Protocol, Side
 from rig.protocol.reader import parse
+from rig.text_rows import read_text
 
 Scene = Literal["two-chains", "one-chain", "object", "track", "picket-fence"]
 SCENES: tuple[Scene, ...] = get_args(Scene)
@@ -81,7 +81,7 @@ def draft_text(draft: Draft) -> str:
 
 
 _WIDTH = 26
-_LINES = Path(__file__).with_suffix(".txt").read_text("utf-8").splitlines()
+_LINES = read_text(__file__).splitlines()
 """Lines of a file after the scenes that have them; all scenes if none is named."""
 
 

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import replace
 
 from rig.boards import BOARDS, LONGEST_RECORD_MS, Capabilities
 from rig.errors import InputError, Problem
-from rig.protocol.protocol import AT_REST, SIDES, Gate, Gates, Protocol
+from rig.protocol.protocol import SIDES, Gate, Protocol
 from rig.protocol.yamltree import load, place_of
 from rig.reasons import rig_error
 
@@ -29,11 +28,11 @@ def longest_fall(protocol: Protocol) -> float:
     This is the time of free fall √(2 h/g): an impact only makes a chain faster, as α > 0.
     """
     chains, gates, gravity = protocol.chains.values(), protocol.gates, protocol.gravity
-    lowest = min((gate.height for gate in gates.gates), default=0.0) if gates else 0.0
+    lowest = min((gate.height for gate in gates.gates), default=0.0)
     reach = max(
         rods.chain.length + max(rods.widths) / 2.0 + _SURE * rods.position_u for rods in chains
     )
-    u = math.hypot(protocol.drop.u, *((gates.height_u, gates.datum_u) if gates else ()))
+    u = math.hypot(protocol.drop.u, gates.height_u, gates.datum_u)
     weakest = max(gravity.value - _SURE * gravity.u, gravity.value / 2.0)
     return math.sqrt(2.0 * (protocol.drop.value + reach + _SURE * u - lowest) / weakest)
 
@@ -49,32 +48,34 @@ def record_ms(protocol: Protocol) -> int:
     return max(LEAST_RECORD_MS, math.ceil(wanted_s * 1e3))
 
 
-def unmeasurable(protocol: Protocol) -> list[str]:
-    """Return the reasons why a drop can only be predicted; empty if it can be measured."""
-    if protocol.initial_speed == AT_REST:
-        return []
-    return [f"initial_speed: the rig releases {protocol.vocabulary.body} from rest"]
-
-
-def with_gates(protocol: Protocol, channels: Collection[int]) -> Protocol:
+def with_channels(protocol: Protocol, channels: Collection[int]) -> Protocol:
     """Return a scene with only the gates at these channels."""
-    if protocol.gates is None:
-        return protocol
-    gates = tuple(gate for gate in protocol.gates.gates if gate.channel in channels)
-    return replace(protocol, gates=replace(protocol.gates, gates=gates))
+    return protocol.with_gates(gate for gate in protocol.gates.gates if gate.channel in channels)
 
 
-def check_gates(protocol: Protocol) -> Gates:
-    """Return the gates of a scene.
+def check_gates(protocol: Protocol) -> None:
+    """Raise an error for a protocol without gates.
 
     Raises
     ------
     InputError
-        It has none, so nothing can be measured.
+        Nothing can be measured.
     """
-    if protocol.gates is None or not protocol.gates.gates:
+    if not protocol.gates:
         raise rig_error("no_gates", source=protocol.source)
-    return protocol.gates
+
+
+def check_released(protocol: Protocol) -> None:
+    """Raise an error for chains that are thrown, as no rig does that.
+
+    Raises
+    ------
+    InputError
+        The chains have an initial speed.
+    """
+    if protocol.thrown:
+        body = protocol.vocabulary.body
+        raise rig_error("not_released", source=protocol.source, body=body)
 
 
 def check_measurable(protocol: Protocol) -> None:
@@ -83,11 +84,10 @@ def check_measurable(protocol: Protocol) -> None:
     Raises
     ------
     InputError
-        The drop cannot be measured; lists all reasons.
+        See `check_gates` and `check_released`.
     """
-    if reasons := "; ".join(unmeasurable(protocol)):
-        hint = "rig predict shows the prediction; leave these keys out to measure"
-        raise InputError(f"{protocol.source}: prediction only, by {reasons}", hint)
+    check_gates(protocol)
+    check_released(protocol)
 
 
 def too_long(protocol: Protocol) -> Problem | None:
@@ -121,7 +121,7 @@ def passing_rods(protocol: Protocol, gate: Gate) -> dict[str, int]:
 
 def most_edges(protocol: Protocol) -> int:
     """Return the largest number of edges of a drop, over the chains that may hang on each side."""
-    sides = map(protocol.gates.on, SIDES) if protocol.gates else ()
+    sides = map(protocol.gates.on, SIDES)
     passing = ([passing_rods(protocol, gate) for gate in gates] for gates in sides)
     most = (max(sum(rods[name] for rods in side) for name in protocol.chains) for side in passing)
     return 2 * sum(most)
@@ -147,7 +147,7 @@ def lacking(protocol: Protocol, board: Capabilities) -> list[Problem]:
     want("most_edges", edges, f"{edges} edges a drop", f"memory for {board.events}", "gates")
     has = f"gates 0 to {board.gates - 1}"
     for side in SIDES:
-        for n, gate in enumerate(protocol.gates.on(side) if protocol.gates else ()):
+        for n, gate in enumerate(protocol.gates.on(side)):
             path = ("gates", side, n, "channel")
             want("gates", gate.channel + 1, str(gate.channel), has, *path)
     return sorted(problems)

@@ -6,7 +6,7 @@ empty, and every later stage leaves it out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import cos, hypot, radians, sin
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -15,7 +15,7 @@ from rig.units import Quantity
 from rig.vocabulary import FENCE, FREE_CHAIN, OBJECT, ONE_CHAIN, TRACK, TWO_CHAINS, Vocabulary
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Iterable
 
     from rig.model.chain import Chain
     from rig.model.surface import Surface
@@ -102,7 +102,7 @@ class Gate:
 
 @dataclass(frozen=True, slots=True)
 class Gates:
-    """The photogate array.
+    """The photogate array; false if it has no gate.
 
     Attributes
     ----------
@@ -115,9 +115,12 @@ class Gates:
         share it.
     """
 
-    gates: tuple[Gate, ...]
-    height_u: float
+    gates: tuple[Gate, ...] = ()
+    height_u: float = DEFAULTS["gates.height_uncertainty"]
     datum_u: float = DEFAULTS["gates.datum_uncertainty"]
+
+    def __bool__(self) -> bool:
+        return bool(self.gates)
 
     def on(self, side: Side) -> tuple[Gate, ...]:
         """Gates of one side, in file order."""
@@ -299,7 +302,7 @@ class Protocol:
     priors
         Priors of all other effects on edges.
     gates
-        `None` for a scene that is only predicted.
+        None of them in a scene that is only predicted.
     blind
         Whether results are withheld until the session is unblinded.
     notes
@@ -317,7 +320,7 @@ class Protocol:
     drop: Quantity
     surface: Surface | None = None
     track: InclinedTrack | None = None
-    gates: Gates | None = None
+    gates: Gates = field(default_factory=Gates)
     release: ReleasePulse = field(default_factory=ReleasePulse)
     plan: Plan = field(default_factory=Plan)
     accept: Accept = field(default_factory=Accept)
@@ -339,6 +342,11 @@ class Protocol:
     def one_object(self) -> bool:
         """Whether a single body passes the gates: a ball, a card, a glider."""
         return all(rods.chain.rods == 1 for rods in self.chains.values())
+
+    @property
+    def thrown(self) -> bool:
+        """Whether chains have an initial speed: then drops can only be predicted."""
+        return self.initial_speed != AT_REST
 
     @property
     def vocabulary(self) -> Vocabulary:
@@ -379,6 +387,10 @@ class Protocol:
         """Chains with separate results as striking chain; for like chains only the first."""
         names = tuple(self.chains)
         return names if self.unlike_chains and self.plan.order != "fixed" else names[:1]
+
+    def with_gates(self, gates: Iterable[Gate]) -> Protocol:
+        """Return the protocol with other gates, whose heights are as uncertain."""
+        return replace(self, gates=replace(self.gates, gates=tuple(gates)))
 
     def condition(self, run: Run) -> Condition:
         """Return the condition of a run, for averages over runs."""

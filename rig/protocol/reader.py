@@ -109,7 +109,7 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> scene.P
         drop=top["drop"],
         surface=top["surface"] and _surface(top["surface"]),
         track=track,
-        gates=top["gates"] and _gates(top["gates"]),
+        gates=_gates(top["gates"]) if top["gates"] else scene.Gates(),
         release=scene.ReleasePulse(**_arguments(top["release"])),
         plan=scene.Plan(**_arguments(top["plan"], incline="inclines")),
         accept=scene.Accept(**_arguments(top["accept"])),

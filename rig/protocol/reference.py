@@ -5,11 +5,11 @@ Tests read every example of the table with the reader itself.
 
 from __future__ import annotations
 
-from pathlib import Path
 from string import Template
 from typing import Any
 
 from rig.protocol import keys
+from rig.text_rows import read_text
 from rig.units import DIMENSIONS
 
 
@@ -21,7 +21,7 @@ def page() -> str:
         example = f"`{key.example}`" if key.example else ""
         rows.append(f"| {name} | {key.accepted} | {key.default} | {key.meaning} | {example} |")
     sources = [f"| `{name}` | {key.source} |" for name, key in keys.SECTIONS["priors"].items()]
-    page = Template(Path(__file__).with_suffix(".txt").read_text("utf-8"))
+    page = Template(read_text(__file__))
     return page.substitute(keys="\n".join(rows), sources="\n".join(sources))
 
 

@@ -11,11 +11,11 @@ import json
 import re
 from collections.abc import Iterator
 from itertools import groupby, islice, product
-from pathlib import Path
 from typing import NamedTuple
 
 import yaml
 
+from rig.text_rows import read_paragraphs
 from rig.units import quote
 
 MOST_PARSED = 150_000
@@ -24,8 +24,7 @@ _CLOSING = {"[": "]", "{": "}"}
 _BRACKET_OR_QUOTED = re.compile(r"\"[^\"]*(?:\"|$)|'[^']*(?:'|$)|[\[\]{}]")
 _QUOTE = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'|(?<![^\s\[{,:])(?P<open>[\"'])[^\n]*")
 NOT_READABLE = "this line cannot be read from here on: see its quotes, brackets, colons and indent"
-_TABLE = Path(__file__).with_suffix(".txt").read_text("utf-8").strip().split("\n\n")[1]
-_MISTAKES = [re.split(r" +\| ", row, maxsplit=3) for row in _TABLE.split("\n")]
+_MISTAKES = [re.split(r" +\| ", row, maxsplit=3) for row in read_paragraphs(__file__)[0]]
 _NEW = {"nothing": "", "blank": " ", "colon": ": "}
 Mend = tuple[int, str, str]
 """A place in a text, what is wrong there, and the text as it should be."""

@@ -47,8 +47,8 @@ class NullSink:
 
 def arm_order(protocol: Protocol, label: int, timeout_ms: int, record_ms: int) -> Arm:
     """Return the request for a protocol's gates and release; see `Arm` for the rest."""
-    gates, release = protocol.gates, protocol.release
-    mask, pulse_us = gates.mask if gates else 0, round(release.pulse * 1e6)
+    mask, release = protocol.gates.mask, protocol.release
+    pulse_us = round(release.pulse * 1e6)
     return Arm(label, mask, 1 << release.channel, pulse_us, timeout_ms, record_ms)
 
 

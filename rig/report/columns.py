@@ -6,11 +6,11 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from rig.measurands import MEASURANDS, Measurand
 from rig.report.numbers import degrees, fixed, plus_minus
+from rig.text_rows import read_paragraphs
 from rig.text_table import text_table
 
 _NOTHING: Mapping[str, Callable[[Any], Any]] = {}
@@ -105,12 +105,10 @@ class _Table(NamedTuple):
     place: str = ""
 
 
-def read_tables(text: str) -> Iterator[tuple[str, _Table]]:
-    """Yield names and tables of a file such as ``columns.txt``."""
-    for block in text.split("\n[")[1:]:
-        (name, heading, *place), *rows = (
-            re.split(r"\] | {2,}", line) for line in block.strip().split("\n")
-        )
+def read_tables(module: str, file: str = "") -> Iterator[tuple[str, _Table]]:
+    """Yield names and tables of a file such as ``columns.txt`` beside a module."""
+    for lines in read_paragraphs(module, file):
+        (_, name, heading, *place), *rows = (re.split(r"^\[|\] | {2,}", line) for line in lines)
         words = " ".join(row[0] for row in rows if len(row) == 1)
         yield name, _Table(heading, words, [row for row in rows if len(row) > 1], *place)
 
@@ -170,7 +168,7 @@ def _verdict(error: float | None, *_: object) -> str:
     return "" if error is None else "agrees" if abs(error) <= 1.0 else "disagrees"
 
 
-_TABLES = dict(read_tables(Path(__file__).with_suffix(".txt").read_text("utf-8")))
+_TABLES = dict(read_tables(__file__))
 _WORDS = ("words", "verdict", "quantity", "symbol")
 """Formats of columns without numbers."""
 _WAYS: dict[str, Callable[..., str]] = {

@@ -34,14 +34,11 @@ def page_parts(
     found: SessionEstimate, sections: Sections, names: Iterable[str] = _PAGE
 ) -> Iterator[Part]:
     """Yield tables of ``columns.txt``; a failed table does not affect the others."""
-
-    def make(name: str) -> list[Part]:
-        words = lines("estimated", name, found, resolution, _correlation)
-        cells = _CELLS | {"contact": partial(_contact, found)}
-        return [*table_parts(name, records_in(name, found), words, cells)]
-
+    cells = _CELLS | {"contact": partial(_contact, found)}
     for name in names:
-        yield from sections.make(f'The section "{heading_of(name)}"', partial(make, name)) or ()
+        with sections.alone(f'The section "{heading_of(name)}"'):
+            words = lines("estimated", name, found, resolution, _correlation)
+            yield from [*table_parts(name, records_in(name, found), words, cells)]
 
 
 def symbol(name: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,11 +28,12 @@ def estimate_pictures(found: SessionEstimate, sections: Sections) -> dict[str, C
     sections
         Collects the names of failed figures.
     """
-    drawn = {
-        name: sections.make(f"The picture of the {name}", partial(draw, found))
-        for name, draw in _PICTURES.items()
-    }
-    return {name: figure for name, figure in drawn.items() if figure is not None}
+    figures: dict[str, Chart] = {}
+    for name, draw in _PICTURES.items():
+        with sections.alone(f"The picture of the {name}"):
+            if (figure := draw(found)) is not None:
+                figures[name] = figure
+    return figures
 
 
 def _alpha(found: SessionEstimate) -> Chart | None:

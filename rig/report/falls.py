@@ -19,7 +19,7 @@ from rig.arrays import Array
 from rig.estimate.curves import model_fall
 from rig.measurands import FALL_TIME, RELEASE_SKEW, SEPARATION, SPEED, acceleration_in
 from rig.protocol.contact import at_contact
-from rig.protocol.protocol import Gates, Protocol, Side
+from rig.protocol.protocol import Protocol, Side
 from rig.records import Drop
 from rig.report.figure import Chart, chart
 from rig.report.numbers import with_unit
@@ -63,7 +63,7 @@ def passages(
         Side of the gates.
     """
     name = result.run.impact if side == "impact" else result.run.free
-    gates = {gate.channel: gate for gate in protocol.gates.on(side)} if protocol.gates else {}
+    gates = {gate.channel: gate for gate in protocol.gates.on(side)}
     row = acceleration_in(result.quantities)
     pull = result.quantities[row.name].value if row else protocol.gravity.value
     begun: dict[tuple[int, int], float] = {}
@@ -90,12 +90,12 @@ def fall_figures(
     """Yield the figures of a good drop: its fall first, then those of the impacts."""
     run, values, head = result.run, result.quantities, f"Run {result.run.number}"
     protocol = at_contact(protocol, run.incline_deg, run.impact)
-    if result.verdict not in GOOD or protocol.gates is None:
+    if result.verdict not in GOOD:
         return
     struck, free = (passages(protocol, drop, hz, result, side) for side in ("impact", "free"))
     if run.impact is None:
         if free.time.size > 2:
-            yield chart("object", _object(protocol, protocol.gates, free, result), run=head)
+            yield chart("object", _object(protocol, free, result), run=head)
         return
     if struck.time.size < 3 or not {FALL_TIME.name, SPEED.name} <= values.keys():
         return
@@ -134,7 +134,7 @@ def fall_figures(
     yield chart("speed", sources, run=head)
 
 
-def _object(protocol: Protocol, gates: Gates, seen: Passages, result: DropResult) -> dict[str, Any]:
+def _object(protocol: Protocol, seen: Passages, result: DropResult) -> dict[str, Any]:
     """Return z(t) and v(t) of an object with the fitted acceleration, and their residuals."""
     row = acceleration_in(result.quantities)
     assert row is not None
@@ -153,7 +153,7 @@ def _object(protocol: Protocol, gates: Gates, seen: Passages, result: DropResult
         "seen": {
             **seen._asdict(),
             "time": time,
-            "height_error": _errors(seen.height, height(time), 2.0 * gates.height_u),
+            "height_error": _errors(seen.height, height(time), 2.0 * protocol.gates.height_u),
             "speed_error": _errors(seen.speed, speed(time), u_speed),
         },
     }

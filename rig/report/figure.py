@@ -10,7 +10,6 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import zip_longest
-from pathlib import Path
 from typing import Any
 
 from rig.analysis.result import Measured
@@ -20,7 +19,7 @@ from rig.text_table import csv_text
 
 COLUMN_PT, WIDE_PT = 244.0, 400.0
 """Width of a journal's column, 86 mm, also for telephones, and of a page."""
-_FIGURES = dict(read_tables(Path(__file__).with_name("figures.txt").read_text("utf-8")))
+_FIGURES = dict(read_tables(__file__, "figures.txt"))
 _FEW = 40  # most points that are drawn large
 _LINES = {"zero": (0.0,), "unity": (-1.0, 1.0)}
 _BARE = ("points", "cross")  # roles without bars

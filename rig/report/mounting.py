@@ -10,7 +10,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from rig.protocol.protocol import Gate, Gates, InclinedTrack, Protocol
+from rig.protocol.protocol import Gate, InclinedTrack, Protocol
 from rig.report.figure import Chart, chart
 from rig.report.templates import render
 
@@ -24,30 +24,22 @@ _LOW_M = -0.02  # shown below the zero
 _MM = 1e3
 
 
-def mounting_figure(protocol: Protocol, gates: Gates) -> Chart:
-    """Return the mounting drawing of a protocol's gates; lengths are in mm.
-
-    Parameters
-    ----------
-    protocol
-        The scene.
-    gates
-        Its gates.
-    """
+def mounting_figure(protocol: Protocol) -> Chart:
+    """Return the mounting drawing of a protocol's gates, of which there are some; in mm."""
     inclines = _inclines(protocol)
     if protocol.track is not None:
-        figure = chart("track", _track(protocol, protocol.track, gates), title=protocol.title)
+        figure = chart("track", _track(protocol, protocol.track), title=protocol.title)
     else:
-        highest = max(gate.height for gate in gates.gates)
+        highest = max(gate.height for gate in protocol.gates.gates)
         hanging = protocol.drop.value + max(c.chain.length for c in protocol.chains.values())
-        near = max(_NEAR_M, 1.5 * min(gate.height for gate in gates.gates))
+        near = max(_NEAR_M, 1.5 * min(gate.height for gate in protocol.gates.gates))
         lowest = f"close to the {protocol.zero}" if inclines else "lowest gates"
         whole = "posts and beams, from the side"
         # Gates below are labelled in the other view, which has room.
-        above = _side_view(protocol, gates, 1.04 * max(highest, hanging), near, whole)
-        below = _side_view(protocol, gates, near, 0.0, lowest)
+        above = _side_view(protocol, 1.04 * max(highest, hanging), near, whole)
+        below = _side_view(protocol, near, 0.0, lowest)
         figure = chart("mounting", above, below, title=protocol.title)
-    known = {"protocol": protocol, "gates": gates, "inclines": inclines, "ends": beam_ends}
+    known = {"protocol": protocol, "inclines": inclines, "ends": beam_ends}
     foot = str(render("mounting.txt", **known)).split("\n")
     return replace(figure, caption=figure.title, foot=foot, width=_WIDTH_PT)
 
@@ -87,7 +79,7 @@ def _inclines(protocol: Protocol) -> list[float]:
     return sorted(set(protocol.plan.inclines)) if protocol.surface is not None else []
 
 
-def _track(protocol: Protocol, track: InclinedTrack, gates: Gates) -> dict[str, Any]:
+def _track(protocol: Protocol, track: InclinedTrack) -> dict[str, Any]:
     """Return a track from the side with its beams; all lengths are along the track from a mark."""
     slope, start = math.radians(track.incline_deg.value), protocol.drop.value
 
@@ -95,7 +87,7 @@ def _track(protocol: Protocol, track: InclinedTrack, gates: Gates) -> dict[str, 
         level = (start - along) * math.cos(slope) + above * math.sin(slope)
         return level, along * math.sin(slope) + above * math.cos(slope)
 
-    tips = [at(gate.height, _POST_M) for gate in gates.gates]
+    tips = [at(gate.height, _POST_M) for gate in protocol.gates.gates]
     return {
         "incline": track.incline_deg.value,
         "true": True,
@@ -104,14 +96,12 @@ def _track(protocol: Protocol, track: InclinedTrack, gates: Gates) -> dict[str, 
         "mark": [at(0.0)],
         "beams": [
             {"label": _name(gate), "ends": [at(gate.height), tip], "tip": [tip]}
-            for gate, tip in zip(gates.gates, tips, strict=True)
+            for gate, tip in zip(protocol.gates.gates, tips, strict=True)
         ],
     }
 
 
-def _side_view(
-    protocol: Protocol, gates: Gates, top: float, named_above: float, title: str
-) -> dict[str, Any]:
+def _side_view(protocol: Protocol, top: float, named_above: float, title: str) -> dict[str, Any]:
     """Return the part below a height, to scale, with names of gates; uphill is to the right."""
     inclines = _inclines(protocol)
     post = _POST_M if top > 2 * _POST_M else top / 2
@@ -124,7 +114,7 @@ def _side_view(
         ends = [(y, y * math.tan(slope) - face) for y in (-0.5 * post, 1.2 * post)]
         name = "" if named_above else f"{incline:g}°"
         boards.append({"ends": ends, "label": name, "place": [at]})
-    for gate in gates.gates:
+    for gate in protocol.gates.gates:
         side, role, color = _SIDES[gate.side]
         if gate.height <= top:
             ends = [(end * post, gate.height) for end in (-side, side, 1.05 * side)]

@@ -77,13 +77,12 @@ def session_page(
 
 def _make(sections: Sections, words: str, make: Callable[..., Any], *arguments: Any) -> list[Any]:
     """Return the parts of a section without empty ones; an empty list if it fails."""
-
-    def list_parts() -> list[Any]:
+    listed: list[Any] = []
+    with sections.alone(words):
         parts = make(*arguments)
         many = isinstance(parts, Iterable) and not isinstance(parts, Mapping)
-        return [part for part in (parts if many else [parts]) if part is not None]
-
-    return sections.make(words, list_parts) or []
+        listed += [part for part in (parts if many else [parts]) if part is not None]
+    return listed
 
 
 def _best_fall(

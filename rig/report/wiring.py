@@ -22,9 +22,9 @@ def wiring_drawing(protocol: Protocol, board: str) -> str:
     board
         A key of `rig.flash.boards.TARGETS`.
     """
-    gates = protocol.gates.gates if protocol.gates else ()
     words = {
-        f"gate-{gate.channel}": f"gate {gate.channel}: {gate.height * 1e3:.1f} mm" for gate in gates
+        f"gate-{gate.channel}": f"gate {gate.channel}: {gate.height * 1e3:.1f} mm"
+        for gate in protocol.gates.gates
     }
     used = {*words, f"release-{protocol.release.channel}"}
     for prefix, uri in (("", _SVG), ("xlink", "http://www.w3.org/1999/xlink")):

@@ -28,8 +28,7 @@ class KnownDrops:
     """
 
     def __init__(self, protocol: Protocol, *, blind: bool = False, fresh: bool = False) -> None:
-        gates = protocol.gates
-        self._content = None if blind else (protocol.text, gates and gates.mask)
+        self._content = None if blind else (protocol.text, protocol.gates.mask)
         self._fresh = fresh
 
     def get(self, drop: Drop) -> DropSummary | None:

@@ -106,8 +106,7 @@ class SessionView(_Scene):
     @property
     def channels(self) -> tuple[int, ...]:
         """Channels of the scene's gates."""
-        gates = self.protocol.gates
-        return () if gates is None else tuple(gate.channel for gate in gates.gates)
+        return tuple(gate.channel for gate in self.protocol.gates.gates)
 
 
 def _scene(session: Reader) -> _Scene:

@@ -251,7 +251,6 @@ def same_owners(parts: Sequence[SessionPart], *, same_rig: bool | None) -> Share
 def _statements(protocol: Protocol) -> dict[str, object]:
     """Return a protocol's statements about the owner of each shared unknown."""
     gates, chains = protocol.gates, protocol.chains
-    assert gates is not None
     beams = [(gate.channel, gate.height, gate.side) for gate in gates.gates]
     scene = (chains, protocol.surface, protocol.contact, protocol.drop)
     return {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -17,7 +16,7 @@ from rig.analysis.summary import Incline
 from rig.cache.entry import CacheEntry
 from rig.clock.calibration import Calibration, Calibrator, TimeScale
 from rig.protocol import reader
-from rig.protocol.measurable import with_gates
+from rig.protocol.measurable import with_channels
 from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, notes_in, rig_error
 from rig.records import Drop, Job
@@ -26,6 +25,7 @@ from rig.results.improvements import improvements
 from rig.results.known_drops import KnownDrops
 from rig.session.reading import Reader, StateEntry
 from rig.session.schema import RunState
+from rig.threads import processors
 
 _MOST_PROCESSES = 4
 """Each process takes 150 MB, and only work drop by drop runs in parallel."""
@@ -109,7 +109,7 @@ def protocol_of(session: Reader) -> Protocol:
 @lru_cache(maxsize=8)
 def _read_protocol(text: str, source: str, beams: tuple[int, ...] | None) -> Protocol:
     protocol = reader.parse(text, source, kept=True)
-    return protocol if beams is None else with_gates(protocol, beams)
+    return protocol if beams is None else with_channels(protocol, beams)
 
 
 def kept_back(session: Reader) -> bool:
@@ -172,7 +172,7 @@ def _analyze(session: Reader, progress: Progress | None, *, fresh: bool) -> Sess
     digest, blind = session.digest(), kept_back(session)
     total = sum(entry.state is RunState.RECORDED for entry in states)
     known = KnownDrops(protocol, blind=blind, fresh=fresh)
-    causes, arguments = rejected_drops(states), (progress, known, total, _processors())
+    causes, arguments = rejected_drops(states), (progress, known, total, _processes())
     complete = analyze(protocol, session.drops(), scale, causes, *arguments)
     analysis = veil(complete) if blind else complete
     gravity = check_gravity(protocol, analysis.runs)
@@ -180,8 +180,8 @@ def _analyze(session: Reader, progress: Progress | None, *, fresh: bool) -> Sess
     return SessionResults(*outcome, None if blind else complete)
 
 
-def _processors() -> int:
-    """Return the number of processes that may be used.
+def _processes() -> int:
+    """Return the number of processes that analyse drops.
 
     A spawned process imports the main program's file again. Only for our own programs is it certain
     that a ``__main__`` guard protects it.
@@ -189,7 +189,7 @@ def _processors() -> int:
     program = getattr(sys.modules["__main__"], "__file__", None) or ""
     if Path(program).stem != "rig" and Path(program).parent != Path(__file__).parents[1]:
         return 1
-    return min(_MOST_PROCESSES, os.cpu_count() or 1)
+    return min(_MOST_PROCESSES, processors())
 
 
 def complete_analysis(

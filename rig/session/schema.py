@@ -9,12 +9,12 @@ import json
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
-from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias
 
 from rig.boards import GATES
 from rig.printable import encodable
 from rig.reasons import Reason, plain_reason, read_record
+from rig.text_rows import read_paragraphs
 from rig.wordings import NOTE, SENTENCE
 
 Row: TypeAlias = tuple[Any, ...]
@@ -237,17 +237,16 @@ def _same(columns: str) -> str:
     return " AND ".join(f"{name} = NEW.{name}" for name in columns.split(", "))
 
 
-def _read_tables(page: str) -> dict[str, SessionTable]:
+def _read_tables() -> dict[str, SessionTable]:
     tables = {}
-    for paragraph in page.strip().split("\n\n")[1:]:
-        head, *rows = paragraph.splitlines()
+    for head, *rows in read_paragraphs(__file__, "tables.txt"):
         words, meaning = head.split(": ", 1)
         name, *since = words.split()
         tables[name] = SessionTable(name, int(*since or "1"), meaning, rows)
     return tables
 
 
-TABLES = _read_tables(Path(__file__).with_name("tables.txt").read_text("utf-8"))
+TABLES = _read_tables()
 """Tables by name, in the order in which a commit's rows are hashed."""
 
 _BESIDES = """

@@ -6,7 +6,6 @@ Falls of a piece are few large operations of numpy, during which other threads g
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Iterator
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import contextmanager
@@ -15,6 +14,7 @@ from typing import Any
 
 from rig import __version__
 from rig.reasons import rig_error
+from rig.threads import processors
 
 PATIENCE_S = 8.0
 
@@ -36,7 +36,7 @@ def executor(jobs: int | None, address: str | None) -> Iterator[tuple[Executor, 
         If it cannot be reached, has no workers, these have another chainrig, or it breaks off.
     """
     if address is None:
-        threads = jobs or _processors()
+        threads = jobs or processors()
         with ThreadPoolExecutor(threads) as pool:
             yield pool, threads
         return
@@ -51,11 +51,6 @@ def executor(jobs: int | None, address: str | None) -> Iterator[tuple[Executor, 
         raise rig_error("cluster_lost", address=address, cause=cause) from error
     finally:
         client.close(timeout=PATIENCE_S)
-
-
-def _processors() -> int:
-    """Return the number of processors this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _connect(address: str) -> Any:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import InputError
 from rig.protocol import reader
-from rig.protocol.measurable import check_gates, check_recordable
+from rig.protocol.measurable import check_recordable
 from rig.tui.widgets.text import plain
 
 if TYPE_CHECKING:
@@ -67,7 +67,6 @@ def read_file(file: Path) -> ProtocolFile:
     protocol = None
     try:
         protocol = reader.read(file)
-        check_gates(protocol)
         check_recordable(protocol)
     except InputError as error:
         lines = [plain(problem, 300) for problem in error.problems]

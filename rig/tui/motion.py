@@ -97,11 +97,10 @@ def motions(
         model's curves alone.
     """
     protocol = at_contact(protocol, run.incline_deg, run.impact)
-    gates = protocol.gates
     sides: tuple[tuple[Side, str | None], ...] = (("impact", run.impact), ("free", run.free))
     falls = []
     for role, name in sides:
-        if name is None or gates is None or not gates.on(role):
+        if name is None or not protocol.gates.on(role):
             continue
         rods, model = protocol.chains[name], None
         with suppress(DomainError):
@@ -114,7 +113,7 @@ def motions(
         if model is not None and times.size:
             delay = float(np.median(times - model.times(heights)))
         if model is not None:
-            lowest = min(gate.height for gate in gates.on(role)) - rods.chain.length
+            lowest = min(gate.height for gate in protocol.gates.on(role)) - rods.chain.length
             struck = float(model.time[-1]) if model.hits is not None else 0.0
             end = delay + (struck or float(model.times(np.array([lowest]))[0]))
         falls.append(

@@ -85,7 +85,7 @@ def drawing(
     lamps: list[Lamp] = []
     pitch = 2.4 * max((_rod_m(fall.rods) for fall in falls), default=_WIDTH_M)
     half, length = 0.5 * pitch, max((fall.length for fall in falls), default=0.0)
-    heights = [gate.height for gate in protocol.gates.gates] if protocol.gates else [0.0]
+    heights = [gate.height for gate in protocol.gates.gates] or [0.0]
     low, high = min(heights) - _MARGIN_M, max(heights) + _MARGIN_M
     # A free chain below the contact point is shown down to the depth of a fallen chain.
     bottom = -0.35 * length if protocol.surface else low - length
@@ -94,7 +94,7 @@ def drawing(
     for middle, fall in zip(middles, falls, strict=True):
         left, right = middle - half, middle + half
         strokes += [Stroke(x, low, x, high, "border") for x in (left, right)]
-        for gate in protocol.gates.on(fall.role) if protocol.gates else ():
+        for gate in protocol.gates.on(fall.role):
             lit = gate.channel in indicators.blocked_channels
             lamps.append(Lamp(gate.channel, left, gate.height, lit))
             end, color = (right, "warning") if lit else (left + 0.2 * half, "foreground")

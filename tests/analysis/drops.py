@@ -56,8 +56,8 @@ class Case:
     truth: Truth
     scale: TimeScale
 
-    def analyze(self, components: Components = STATED) -> DropResult:
-        return DropCase(self.protocol, self.run, self.drop, self.scale, components).read()[0]
+    def analyze(self) -> DropResult:
+        return DropCase(self.protocol, self.run, self.drop, self.scale).read()[0]
 
     def judge(self) -> DropResult:
         """The same, but what else would explain a void drop is not sought: that takes longest."""
@@ -92,11 +92,11 @@ class Case:
     @one_thread
     def identify(self) -> Identification:
         """The best reading of the edges."""
-        return identify(self.protocol, self.records, self.scale.u, STATED)
+        return identify(self.protocol, self.records, self.scale.u)
 
     def model(self) -> tuple[DropModel, dict, np.ndarray]:
         """The observation equations of this drop, its fall, and the matches that it gives."""
-        fit = self.identify().fit
+        fit = self.identify().reading.fit
         x, at = np.zeros(fit.x.size), fit.model.unknowns
         for name in ("impact release", "free release", "alpha", "clock", "drag", "drop"):
             if name in at:

@@ -12,7 +12,7 @@ from rig.model.impact import impact_on
 from rig.records import Edge
 from rig.units import Quantity
 from sim.dials import Dials
-from tests.analysis.drops import HZ, STATED, UNIFORM, case
+from tests.analysis.drops import HZ, UNIFORM, case
 
 RECORD = case(UNIFORM, Dials.quiet(), incline=40.0)
 
@@ -38,7 +38,7 @@ def test_a_record_may_begin_long_before_the_fall_and_end_long_after_it(late):
 
 def test_no_falls_come_by_at_no_times():
     """As where all that a suspected fault leaves possible is outside of α's domain."""
-    model = DropModel.of(UNIFORM, RECORD.records, 0.0, STATED)
+    model = DropModel.of(UNIFORM, RECORD.records, 0.0)
     side = model.side("impact")
     times = side.path(np.zeros((0, UNKNOWNS))).times(side.levels)
     assert times.shape == (0, side.levels.size)

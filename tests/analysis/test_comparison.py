@@ -54,6 +54,18 @@ def test_one_fall_is_off_by_its_own_scatter_and_n_by_its_share_but_by_no_less_th
     assert compared(differing(0.002, wild)).u > 4.0 * 0.001
 
 
+def test_drops_of_unlike_fits_share_what_is_common_to_each():
+    model = 0.11546810526538031
+    kinds = [Deviation(4e-6, math.inf, plus, minus)
+             for plus, minus in (((3e-3,), (0.0,)), ((3e-3, 4e-3), (0.0, 4e-3)))]  # fmt: skip
+    each = [compared([Measured(model, 0.0, deviation=kind)]) for kind in kinds]
+    both = compared([Measured(model, 0.0, deviation=kind) for kind in kinds])
+    assert [one.u for one in each] == pytest.approx([math.sqrt(13e-6)] * 2)
+    # 8 degrees of freedom are foretold, and 1 is seen, without any scatter.
+    own = 2e-6 * 8.0 / 9.0 * (coverage_factor(81.0) / Z) ** 2
+    assert both.u == pytest.approx(math.sqrt(9e-6 + own), rel=2e-6)
+
+
 def test_what_the_protocol_states_of_coefficients_counts_once():
     """Against a model that is wrong by its own β, many inclines are no more than one."""
     found = analysis((30.0, 50.0, 70.0))

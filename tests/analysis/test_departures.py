@@ -9,7 +9,7 @@ import pytest
 
 from rig.analysis.fit import CLOSE
 from rig.analysis.last_passages import disagreements
-from rig.analysis.likeness import Likeness, likeness
+from rig.analysis.likeness import ENOUGH, Likeness, likeness
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.session import Analysis
 from rig.protocol.protocol import Contact
@@ -117,6 +117,9 @@ def test_falls_are_said_to_look_like_the_model_or_not(straight, crooked):
     assert like is not None
     assert unlike is not None
     assert (like.like, unlike.like) == (True, False)
+    assert like.impulses is not None
+    few = dict(straight.joint.degrees) | {"impulse": ENOUGH - 0.1}
+    assert likeness(replace(straight.joint, degrees=few)).impulses is None
     assert unlike.json()["departure_m"] == pytest.approx(DEPARTURE, rel=0.15)
     assert unlike.sentence.startswith("Measured positions differ from the model by ")
     assert not Likeness(departure=0.0, impulses=0.2).like

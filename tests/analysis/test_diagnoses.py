@@ -195,7 +195,7 @@ def test_a_post_of_two_gates_may_stand_wrong_and_of_one_it_is_the_gate():
     of = {gate.channel: gate for gate in UNIFORM.gates.on("free")}
     for count in (1, 2):
         gates = (*UNIFORM.gates.on("impact"), *[*of.values()][:count])
-        few = replace(UNIFORM, gates=replace(UNIFORM.gates, gates=gates))
+        few = UNIFORM.with_gates(gates)
         posts = [
             fault.values(0.01, 0.001)["side"]
             for fault in faults(Premise(few, runs(few)[0], 1.0), Suspects())

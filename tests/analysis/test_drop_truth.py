@@ -60,7 +60,7 @@ def test_a_perfect_rig_measures_the_truth(scene, incline):
 def test_any_scene_is_read(seed):
     """Rods from one to 60, alike or not, their α given or not; gates few or many, high or low."""
     drawn = scene(seed).protocol
-    if drawn.gates is None:
+    if not drawn.gates:
         return
     for dials, most in ((Dials.quiet(), 0.01), (Dials(skew_sd=1e-3), 1.0)):
         one = case(drawn, dials, seed=seed)

@@ -16,7 +16,7 @@ from rig.analysis.session import analyze
 from rig.analysis.verdict import _SURE, _air
 from rig.errors import InputError
 from rig.model.chain import Chain
-from rig.protocol.protocol import Accept
+from rig.protocol.protocol import Accept, Gates
 from rig.protocol.reader import parse
 from rig.reasons import Reason, make_reason, plain_reason
 from rig.records import Certificate, Edge
@@ -266,7 +266,7 @@ def test_a_run_that_is_not_planned_or_a_scene_without_gates_is_bad_input():
     with pytest.raises(InputError, match="damaged: run 13: its bytes say otherwise; see rig recov"):
         analyze(SINGLE, [damaged], scale)
     with pytest.raises(InputError, match="no gates"):
-        analyze(replace(SINGLE, gates=None), [drop], scale)
+        analyze(replace(SINGLE, gates=Gates()), [], scale)
 
 
 def test_a_session_of_void_drops_has_no_summary():

@@ -175,10 +175,10 @@ def test_the_likeliest_of_all_readings_is_chosen(name):
     one = spoiled(case(protocol, UNDISTURBED), missed, strays)
     (likeliest, _, given), *rest = oracle(one, least)
     found = one.identify()
-    assert found.fit is not None
-    assert found.fit.rods == given
+    assert found.drop is not None
+    assert found.drop.rods == given
     # Laplace's method is exact for what is normal; a fall is, but for the noise's own slope.
-    assert found.evidence == pytest.approx(likeliest, abs=0.01)
+    assert found.reading.evidence == pytest.approx(likeliest, abs=0.01)
     others = [row for row in rest if unlike(row[2], given)]
     most = likeliest - max((row[0] for row in others), default=-math.inf)
     least_odds = likeliest - max((row[1] for row in others), default=-math.inf)
@@ -198,19 +198,19 @@ def test_what_cannot_be_told_is_void_and_the_odds_are_stated():
     odds = likeliest - max(log for log, _, other in rest if unlike(other, given))
     assert odds < math.log(3.0)
     found = one.identify()
-    assert found.evidence == pytest.approx(likeliest, abs=0.01)
+    assert found.reading.evidence == pytest.approx(likeliest, abs=0.01)
     assert found.log_odds == pytest.approx(odds, abs=0.1)
     assert any(
         reason.values["odds"] == math.exp(found.log_odds)
         for reason in pattern_faults(found).values()
     )
     assert [reason.code for reason in one.analyze().reasons] == ["two_falls"]
-    assert {found.fit.rods[edge] for edge in found.fit.rods} != set(found.other.rods.values())
+    assert {found.drop.rods[edge] for edge in found.drop.rods} != set(found.other.rods.values())
 
 
 @pytest.mark.parametrize(("share", "code"), [(0.59, "few_edges_fit"), (0.61, "no_fall")])
 def test_six_in_ten_edges_must_fit_a_fall(share, code):
-    identified = SimpleNamespace(shares={"free": share}, fit=None)
+    identified = SimpleNamespace(shares={"free": share}, drop=None)
     assert pattern_faults(identified)["free"].code == code
 
 
@@ -218,7 +218,7 @@ def test_a_further_gate_tells_what_one_cannot():
     """It is put where the two falls differ, and there the same drop is read."""
     protocol = few_bars(3, [60], 60e-3)
     found = spoiled(case(protocol, Dials.quiet()), [0, 1], []).identify()
-    role, height = deciding_gate(found.fit, found.other)
+    role, height = deciding_gate(found.drop, found.other)
     assert role == "free"
     two = few_bars(3, [60, round(height * 1e3)], 60e-3)
     whole = case(two, Dials.quiet())
@@ -227,7 +227,7 @@ def test_a_further_gate_tells_what_one_cannot():
     again = spoiled(whole, first, []).identify()
     assert again.log_odds > LEAD
     kept = [origin for n, origin in enumerate(whole.truth.edges) if n not in first]
-    assert all(again.fit.rods[n] == kept[n][3] for n in again.fit.rods)
+    assert all(again.drop.rods[n] == kept[n][3] for n in again.drop.rods)
 
 
 def test_steps_that_an_edge_at_an_impact_stops_are_begun_once_more(tmp_path):

@@ -11,6 +11,7 @@ from rig.analysis.budgets import Budgets
 from rig.analysis.components import LEAST_SHARE, above
 from rig.analysis.drop import DropCase
 from rig.analysis.equations import STRAY, linearize
+from rig.analysis.fit import alone as fit_alone
 from rig.analysis.joint_fit import FEWEST, by_itself, joint_fit
 from rig.analysis.quantities import measurands
 from rig.analysis.result import GOOD
@@ -63,7 +64,7 @@ class Whole:
 )
 def test_eliminating_drop_by_drop_is_solving_all_at_once(name, near, line):
     """The estimate is −C(Jᵀr − x₀): linear in the edges r and in the prior means x₀."""
-    alone = None if name == "session" else fits(cases((1,), scene=name))[0]
+    alone = None if name == "session" else fit_alone(fits(cases((1,), scene=name))[0])
     joint = fit_session(FOUR) if alone is None else by_itself(alone)
     assert joint.settled
     whole = Whole(joint)
@@ -183,7 +184,7 @@ def test_a_drop_that_does_not_go_with_the_others_stays_by_itself():
     pushed = [
         replace(gate, height=gate.height + (-1) ** n * 1.2e-3) for n, gate in enumerate(gates)
     ]
-    other = replace(UNIFORM, gates=replace(UNIFORM.gates, gates=tuple(pushed)))
+    other = UNIFORM.with_gates(pushed)
     rest = cases(FOUR)
     last = replace(case(other, MILD, run=5), protocol=UNIFORM)
     alone = last.analyze()

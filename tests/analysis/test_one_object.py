@@ -130,7 +130,7 @@ def test_runs_are_averaged_gate_by_gate():
 
 
 LOWEST = BALL.gates.gates[-1]
-ONE_GATE = replace(BALL, gates=replace(BALL.gates, gates=(LOWEST,)))
+ONE_GATE = BALL.with_gates([LOWEST])
 
 
 def crossings(protocol, falls):
@@ -170,7 +170,7 @@ def test_what_came_back_is_left_out_and_said_so(protocol, gates, restitution):
     """A ball that bounces, a glider that returns from the end of its track."""
     if gates == "one":
         lowest = min(protocol.gates.gates, key=lambda gate: gate.height)
-        protocol = replace(protocol, gates=replace(protocol.gates, gates=(lowest,)))
+        protocol = protocol.with_gates([lowest])
     protocol = replace(protocol, drag=None)
     arrival = np.sqrt(2.0 * protocol.gravity.value * protocol.drop.value)
     bounces = [arrival * restitution**n for n in (1, 2, 3)]

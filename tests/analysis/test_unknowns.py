@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from bench.studies.layout_catalogue import KINDS, STANDARD, Kind, under
+from rig.analysis.components import above
 from rig.analysis.drop_model import DropModel
+from rig.model.chain import Chain
 from rig.protocol import reader
 from rig.units import Quantity
 from tests.analysis.drops import SCENES, case
@@ -21,7 +23,7 @@ def gates_moved(protocol, which, by):
         replace(gate, height=gate.height + by * which(number, gate))
         for number, gate in enumerate(protocol.gates.gates)
     ]
-    return replace(protocol, gates=replace(protocol.gates, gates=tuple(gates)))
+    return protocol.with_gates(gates)
 
 
 def chain_changed(protocol, name, rod, higher, wider):
@@ -30,6 +32,10 @@ def chain_changed(protocol, name, rod, higher, wider):
     widths = tuple(width + wider for width in old.widths)
     new = replace(old, chain=replace(old.chain, heights=heights), widths=widths)
     return replace(protocol, chains={**protocol.chains, name: new})
+
+
+def test_the_mass_above_a_rod_counts_in_units_of_its_own():
+    assert above(Chain((1.0, 2.0, 4.0), (0.0, 0.1, 0.3))).tolist() == [6.0, 2.0, 1.0]
 
 
 @pytest.mark.parametrize("scene", ["uniform", "unlike", "single", "fence"])

@@ -15,7 +15,7 @@ from bench.studies.layout_catalogue import LAYOUTS
 from bench.studies.layouts import DISTURBANCES
 from bench.studies.wrong_rigs import WRONG_RIGS
 from rig import cli
-from rig.protocol.measurable import unmeasurable
+from rig.protocol.measurable import check_measurable
 from rig.protocol.reader import parse
 from sim.dials import Dials
 from tests.analysis.drops import UNIFORM, case
@@ -55,7 +55,7 @@ def test_every_fault_is_of_some_layout_and_another_rig_than_the_stated_one():
         rigs = [(one, rig) for one, sizes in every for rig in (*sizes[:1], *sizes[1:][-1:])]
         assert rigs, fault.name
         for layout, (size, text) in rigs:
-            assert parse(text).gates is not None
+            assert parse(text).gates
             otherwise = fault.settings(size) or fault.slow(size)
             assert otherwise or json.loads(text) != json.loads(layout.protocol())
 
@@ -63,7 +63,7 @@ def test_every_fault_is_of_some_layout_and_another_rig_than_the_stated_one():
 @pytest.mark.parametrize("layout", LAYOUTS, ids=lambda one: f"{one.kind.name}: {one.heights}")
 def test_every_layout_is_a_protocol_that_can_be_measured(layout):
     protocol = parse(layout.protocol())
-    assert not unmeasurable(protocol)
+    check_measurable(protocol)
     assert len(protocol.gates.gates) == len(layout.impact) + len(layout.free)
     assert (protocol.surface is None) == (layout.kind.scene == "fence")
     assert protocol.two_chains == (layout.kind.scene == "two")

@@ -152,7 +152,9 @@ def test_another_program_computes_itself(fence, counted, monkeypatch):
     assert len(counted) == 4
 
 
-@pytest.mark.parametrize("text", ["", "[]", '["list",1]', "no JSON", '["rig.records:Job",1,1]'])
+@pytest.mark.parametrize(
+    "text", ["", "[]", '["list",1]', "no JSON", '["rig.records:Job",1,1]', "[" * 100_000]
+)
 def test_what_is_kept_and_cannot_be_read_is_computed_again(fence, counted, monkeypatch, text):
     with monkeypatch.context() as patch:
         patch.setattr(CacheFolder, "get", lambda *_: text)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rig.analysis.components import Components, priors
-from rig.design.cases import BEAM, cases, with_gates
+from rig.design.cases import BEAM, cases
 from rig.design.forecast import Forecast, GateLayout, forecast
 from rig.design.search import Room, better, score
 from rig.design.trials import DROPS, Trials, readable, trials, trials_text
@@ -144,7 +144,7 @@ def test_proposals_respect_limits_and_are_never_worse():
     moved = [h for h in heights if h not in there]
     assert all(np.abs(hanging - h).min() >= 0.0127 / 2 for h in moved)
     assert heights[0] < there[0]  # V shows below the last rod gap
-    every = cases(with_gates(protocol, [*protocol.gates.gates, *found]), TRUE)
+    every = cases(protocol.with_gates([*protocol.gates.gates, *found]), TRUE)
     before, after = (GateLayout.of(every, range(n, n + 4)) for n in (0, 4))
     assert score(protocol, after) < score(protocol, before)
     now, then = (

@@ -134,7 +134,7 @@ def test_an_adjustment_takes_what_the_protocol_states():
     components = priors(wide)
     assert (components.hang, components.beam, components.impulse) == (3e-3, 10e-3, 0.5)
     narrow, loose = (
-        case(protocol, run=one.run.number).analyze(None).quantities["separation_m"]
+        case(protocol, run=one.run.number).analyze().quantities["separation_m"]
         for protocol in (UNIFORM, wide)
     )
     assert loose.u > 1.2 * narrow.u

@@ -223,7 +223,7 @@ READY = [
 
 
 def drawn(protocol):
-    return figure_file(mounting_figure(protocol, protocol.gates), "svg").decode()
+    return figure_file(mounting_figure(protocol), "svg").decode()
 
 
 @pytest.mark.parametrize("path", READY, ids=lambda path: path.stem)

@@ -84,15 +84,13 @@ def test_a_page_says_what_it_lacks(single, monkeypatch):
 def test_a_missing_package_is_no_failed_section():
     sections = Sections()
 
-    def fail(error: Exception, cause: Exception | None = None) -> None:
-        raise error from cause
-
-    with pytest.raises(ModuleNotFoundError):
-        sections.make("one", lambda: fail(ModuleNotFoundError("no scipy", name="scipy")))
-    with pytest.raises(InputError):
-        sections.make("one", lambda: fail(InputError("no figures"), ImportError("matplotlib")))
+    with pytest.raises(ModuleNotFoundError), sections.alone("one"):
+        raise ModuleNotFoundError("no scipy", name="scipy")
+    with pytest.raises(InputError), sections.alone("one"):
+        raise InputError("no figures") from ImportError("matplotlib")
     assert not sections.failed
-    assert sections.make("one", lambda: fail(InputError("no good drop", "see why"))) is None
+    with sections.alone("one"):
+        raise InputError("no good drop", "see why")
     assert sections.failed == {"one": "one could not be made: no good drop"}
 
 

@@ -133,7 +133,7 @@ class _Journey:
         self.read("check", checked.out.partition("\nLeft out\n")[0])
         self.predicted()
         self.swept()
-        if self.scene.protocol.gates is None:
+        if not self.scene.protocol.gates:
             for command in (("run", self.protocol, "--port", self.scene.port, "--session",
                              self.session, "--yes"), ("design", self.protocol)):  # fmt: skip
                 self.call(*command, promised=(BAD_INPUT,))

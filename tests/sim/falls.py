@@ -11,11 +11,11 @@ from typing import Any
 
 from mpmath.ctx_mp import MPContext
 
-from rig.protocol import reader
+from rig.protocol import protocol, reader
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 UNIFORM = reader.read(PROTOCOLS / "inclined-uniform.yaml")
-WITHOUT_GATES = replace(UNIFORM, gates=None)
+WITHOUT_GATES = replace(UNIFORM, gates=protocol.Gates())
 
 mp = MPContext()  # of its own, so that no other test's digits change
 mp.dps = 40

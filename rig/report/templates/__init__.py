@@ -97,10 +97,15 @@ def page_html(page: Mapping[str, Any]) -> tuple[str, list[Chart]]:
         svg = page_svg(figures[-1], _WIDTHS[kind], kind, f"{kind[0]}{len(figures)}")
         return Markup(svg)  # noqa: S704 - all text of files in it is escaped
 
-    script = render("page.js")
-    digest = base64.b64encode(sha256(script.encode()).digest()).decode()
-    known = {**page, "number": number, "draw": draw, "script": script, "digest": digest}
+    known = {**page, **read_script("page.js"), "number": number, "draw": draw}
     return str(render("page.html", **known)), figures
+
+
+def read_script(name: str) -> dict[str, str]:
+    """Return a page's ``script``, and its ``digest`` for the page's security policy."""
+    script = render(name)
+    digest = base64.b64encode(sha256(script.encode()).digest()).decode()
+    return {"script": script, "digest": f"sha256-{digest}"}
 
 
 def _prose(sentence: str) -> str:

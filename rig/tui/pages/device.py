@@ -67,7 +67,7 @@ def _release(model: Model) -> Content:
 
 
 def _gate_check(model: Model) -> Content:
-    gates = model.protocol.gates.gates if model.protocol and model.protocol.gates else ()
+    gates = model.protocol.gates.gates if model.protocol else ()
     indicators = model.indicators
     if not indicators.known:
         return Content("Waiting for the gates.")

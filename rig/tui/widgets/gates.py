@@ -17,7 +17,7 @@ def board(
     protocol: Protocol | None, indicators: Indicators, now_s: float, width: int
 ) -> list[Content]:
     """Return a line for each gate, the highest first; both sides side by side if they fit."""
-    if protocol is None or protocol.gates is None:
+    if protocol is None or not protocol.gates:
         return [Content("no gates in this scene")]
     sides = [sorted(protocol.gates.on(side), key=lambda gate: -gate.height) for side in SIDES]
     titles = ("impact side", "free side") if protocol.vocabulary.two_sides else ("gates",) * 2
@@ -53,7 +53,7 @@ def _line(gate: Gate, indicators: Indicators, now_s: float) -> Content:
 
 def label(model: Model, channel: int) -> str:
     """Return the name of a channel's gate."""
-    for gate in model.protocol.gates.gates if model.protocol and model.protocol.gates else ():
+    for gate in model.protocol.gates.gates if model.protocol else ():
         if gate.channel == channel:
             side = f"{gate.side} side, " * model.words.two_sides
             return f"channel {channel}: {side}{gate.height * 1e3:.1f} mm"
