@@ -11,12 +11,13 @@ import re
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.timers import vocabulary
 from rig.timers.moments import TICK_HZ
+from rig.timers.table import Row, RowBlock
 from rig.timers.vocabulary import (
     POWERS,
     SYMBOLS,
@@ -29,7 +30,6 @@ from rig.timers.vocabulary import (
 )
 
 if TYPE_CHECKING:
-    from rig.timers.table import Row, RowBlock
     from rig.timers.timer_file import TimerFile
 
 SAMPLED = ("level", "volts")
@@ -80,7 +80,7 @@ class TimerColumn:
     wraps
         Where a counter of µs or ms may begin anew, ps.
     words
-        Two words that are unknown, for which falls decide: the one that begins, and the other.
+        What two unknown words mean, for which falls decide: the one that begins is ``high``.
     """
 
     at: int
@@ -92,14 +92,14 @@ class TimerColumn:
     state: str = ""
     numbered: bool = False
     wraps: tuple[int, ...] = ()
-    words: tuple[str, ...] = ()
+    words: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def meaning(self) -> str:
         """What it was taken for, in words."""
         meaning = " or ".join(roles()[role][0] for role in self.role.split("|"))
         meaning += f" in {SYMBOLS[self.power]}" * (self.role == "time")
-        return meaning + "".join(f": {word!r} is high" for word in self.words[:1])
+        return meaning + "".join(f": {word!r} is high" for word in [*self.words][:1])
 
 
 ROW_COUNT = TimerColumn(-1, "", "index")
@@ -156,13 +156,7 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     states = sum("all.state" in fact for fact in facts.values())
     shared |= {f"columns.{min(len(facts), _MANY)}", f"states.{min(states, _MANY)}"}
     shared |= {"rated"} if block.find_time_base() else set()
-    columns = [_read_heading(block, heading, n, fact | shared) for n, fact in facts.items()]
-    for column in columns:
-        texts = cells[column.at]
-        if column.role == "edge" and {"pair", "all.state"} & facts[column.at] == {"pair"}:
-            column.words = tuple(dict.fromkeys(texts))
-        if column.role == "time" and "all.timed" in facts[column.at]:
-            column.power = POWERS[unit_of(texts[0])]
+    columns = [_read_column(block, heading, n, facts[n] | shared, cells[n]) for n in facts]
     if heading is None:
         for row in block.headings:
             if row.known > 1 and len(row.texts) > width:
@@ -195,32 +189,32 @@ def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
     meant |= {"level": "volts"} if "volts" in there else {}  # those that are 0 at first
     unclear = [column for column in columns if "|" in column.role]
     readings = [column.role.split("|") for column in unclear]
-    used = Counter(there - {"other"}) + Counter({"edge": bool(there & {*itertools.chain(*VALUES)})})
     ways = [
         way
         for way in itertools.product(*readings if len(unclear) <= _MOST_OPEN else [[]])
-        if all((used + Counter(way))[role] == 1 for role in way if role != "other")
-    ]
+        if all(role == "other" or (role not in there and way.count(role) == 1) for role in way)
+    ] or [("setting",) * len(unclear)]
     file.ways = max(file.ways, len(ways))
     file.is_guess |= len(ways) > 1
-    chosen = [*(ways[file.way % len(ways)] if ways else ()), *["setting"] * len(unclear)]
-    for column, role in zip(unclear, chosen, strict=False):
+    for column, role in zip(unclear, ways[file.way % len(ways)], strict=True):
         column.role = role
     for column in columns:
         column.role = meant.get(column.role, column.role)
         file.has_unit &= column.role != "time" or column.power is not None
 
 
-def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str]) -> TimerColumn:
-    """Find out what a column is by its heading; the other rows above it may say unit or gate."""
+def _read_column(
+    block: RowBlock, heading: Row | None, n: int, facts: set[str], cells: Sequence[str]
+) -> TimerColumn:
+    """Find out what a column is; the rows above its heading, or its cells, may say the unit."""
     name = heading.cell(n) if heading else ""
     column = TimerColumn(n, name or f"column {n + 1}", run=_heading_label(block, heading, n, "run"))
     prefix, _, rest = name.partition(":")
     if rest.strip() and not find_label(prefix, "gate"):
         column.run, name = column.run or prefix.strip(), rest
     bare = vocabulary.without_accents(name).replace(column.run, "")
-    texts = (bare, *(row.cell(n) for row in reversed(block.headings) if row.has_units))
-    units = list(map(unit_of, texts))
+    above = (row.cell(n) for row in reversed(block.headings) if row.has_units)
+    units = list(map(unit_of, (bare, *above, *cells[: "all.timed" in facts])))
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
     rows = (row for row in block.headings if form("row of numbers").fullmatch(row.raw))
     numbers = next((row.cell(n) for row in rows), "")
@@ -245,11 +239,13 @@ def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str])
         if all((fact.lstrip("-") in facts) is (fact[0] != "-") for fact in rule.split())
     )
     if column.role in {"time", "elapsed"}:
-        column.power = 0 if "all.stamp" in facts else POWERS.get(unit)
+        column.power = POWERS.get(unit, 0 if "all.stamp" in facts else None)
         column.state = next((state for state in ("clear", "blocked") if state in facts), "")
         column.numbered = "moment" in facts
         if {"all.count", "far"} <= facts and column.power in {3, 6}:
             column.wraps = tuple(2**bits * TICK_HZ // 10**column.power for bits in _COUNTER_BITS)
+    if column.role == "edge" and {"pair", "all.state"} & facts == {"pair"}:
+        column.words = dict(zip(dict.fromkeys(cells), ("high", "low"), strict=True))
     return column
 
 
@@ -310,18 +306,17 @@ def pair_columns(columns: Sequence[TimerColumn]) -> list[Signal]:
     is_sampled, pairs = chosen == SAMPLED, list[Signal]()
     for clock in times:
         own = [column for column in columns if _clock_of(column, times) is clock]
-        places = {} if is_sampled else {c.role: c.at for c in [*columns[::-1], *own[::-1]]}
+        places = {} if is_sampled else {c.role: c.at for c in columns[::-1]}
         names = places.get("run", _NOWHERE), places.get("gate", _NOWHERE)
         values = [column for column in own if column.role in chosen]
+        if not values and not is_sampled:
+            values = [replace(clock, at=_NOWHERE, role="moment")]
         labels = Counter(map(_label_of, values))
         for n, value in enumerate(values, 1):
             is_beside = is_sampled or len(values) > 1
             label = _label_of(value) if is_beside else clock.gate or value.gate
             label += f" ({n})" if is_sampled and labels[label] > 1 else ""
             pairs.append(Signal(clock, value, clock.run or value.run, label, *names))
-        if not values and not is_sampled:
-            moment = replace(clock, at=_NOWHERE, role="moment")
-            pairs.append(Signal(clock, moment, clock.run, clock.gate, *names))
     return pairs
 
 
@@ -343,5 +338,4 @@ def _clock_of(value: TimerColumn, times: Sequence[TimerColumn]) -> TimerColumn:
 def _label_of(value: TimerColumn) -> str:
     """Return what the file calls an input: the heading of samples, or the gate's name in it."""
     is_named = value.role in SAMPLED and value.gate in value.name
-    name = value.name.replace(value.run, "").strip(" ,:")
-    return name if is_named or not value.gate else value.gate
+    return value.name if is_named or not value.gate else value.gate

@@ -189,8 +189,8 @@ class Table:
         sample = list(itertools.islice(unwrapped, _SAMPLE))
         self._lines = itertools.chain(sample, unwrapped)
         plain = [line for _, line in sample if line.strip() and not vocabulary.is_remark(line)]
-        self._names = _find_names(plain[-_JUDGED:])
-        self.separator = find_separator(plain, self._names)
+        self._names, named = _find_names(plain[-_JUDGED:])
+        self.separator = find_separator(plain, named)
         self._usual: tuple[tuple[bool, bool], ...] = ()
         shapes = Counter(x for x in (_shape(self.split(y)) for y in plain) if any(map(all, x)))
         self._fewest = 1 + (2 * sum(n for x, n in shapes.items() if len(x) > 1) > shapes.total())
@@ -316,21 +316,21 @@ def _named_values(line: str) -> list[tuple[_Name, str]]:
     return values
 
 
-def _find_names(lines: Sequence[str]) -> list[_Name]:
-    """Return what most lines name before their values; nothing if they name none."""
+def _find_names(lines: Sequence[str]) -> tuple[list[_Name], int]:
+    """Return what most lines name before their values, and how many values they name so."""
     rows = [tuple(name for name, _ in _named_values(line)) for line in lines]
     usual, count = Counter(filter(None, rows)).most_common(1)[0] if any(rows) else ((), 0)
     is_named = any(name[1:] for name, _ in usual) and 2 * count > sum(map(bool, rows))
-    return [*usual] if is_named else []
+    return ([*usual], count * len(usual)) if is_named else ([], 0)
 
 
-def find_separator(lines: Sequence[str], names: Sequence[_Name]) -> str:
+def find_separator(lines: Sequence[str], named: int) -> str:
     """Find what stands between the cells: what leaves most values in the lines with a number.
 
     Parameters
     ----------
-    names
-        Words before values, if these may stand between words; then nothing is between them.
+    named
+        How many values stand between words; where most do, nothing else is between them.
     """
     rows = [line[:1000] for line in lines if re.search("[0-9]", line[:1000])][-_JUDGED:]
     is_named = any(re.search("[A-Za-z][A-Za-z0-9]", line) and "," in line for line in lines[:200])
@@ -341,8 +341,7 @@ def find_separator(lines: Sequence[str], names: Sequence[_Name]) -> str:
     ]
     if 2 * len(numbers) > len(rows) and not is_named and sorted(numbers, key=float) == numbers:
         return ";"  # times go on with decimal commas; 0,25 below 1,5 is no decimal comma
-    values = [[name for name, _ in _named_values(row)] for row in rows if names]
-    counts = {"": (sum(map(len, filter(names.__eq__, values))), 0)} if names else {}
+    counts = {"": (named, 0)} if named else {}
     marks = [mark for mark in "\t;|" if 2 * sum(mark in row for row in rows) > len(rows)]
     for mark in marks or ", ":
         cells = [kinds_of(text) for row in rows for text in split_cells(row, mark) if text]

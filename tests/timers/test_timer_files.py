@@ -88,7 +88,6 @@ faults = partial(faults_of, read)
         ("Time,State\n0.1,x\n0.2,0\n", (2, 5, "state")),
         ("0.1,x\n0.2,0\n", (1, 5, "edge")),
         ("Time,Blocked\n0.1,low\n0.2,0\n0.3,1\n", (2, 5, "state")),
-        ("Time,State\n0.2,1\n0.3\n", (3, 1, "state")),
         ("Distance,State\n0.2,1\n", (1, 1, "")),
         ("", (1, 1, "")),
         ("nothing here\n", (1, 1, "")),
