@@ -6,17 +6,16 @@ import argparse
 import os
 import re
 import sys
+from collections.abc import Sequence
 from functools import cache, partial
 from shlex import quote
+from typing import Any, NoReturn
 
 from rig import __version__
 from rig.command_page import COMMANDS, first_help
 from rig.streams import say
 
 TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from typing import Any, NoReturn
 
 _NAMED = rf"(?<![\w/.-])rig (?=(?:{'|'.join(COMMANDS)}|--help)(?![\w:-]))"
 """A command, but not the name that begins a program's own narration, as in ``rig daemon:``."""

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections import namedtuple
+from collections.abc import Iterable
+from typing import Any
 
 TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-    from typing import Any
 
 
 # Of collections, for typing takes a third as long to load as Python.

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 
 TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 COUNTED = {
     "impact.impact_on": "impact coefficients",

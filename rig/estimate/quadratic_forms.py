@@ -10,24 +10,20 @@ say is lost.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from rig.analysis.equations import STRAY, robust_weights
 from rig.analysis.fit import Fit
+from rig.analysis.joint_step import JointDrop
 from rig.analysis.square_root import EquationRows, eliminate
 from rig.analysis.trajectory import COMMON, DRAG
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rig.analysis.joint_step import JointDrop
-    from rig.analysis.unknowns import SharedUnknowns
-    from rig.arrays import Array, Index
-    from rig.model.chain import Chain
-    from rig.protocol.protocol import Run
-
+from rig.analysis.unknowns import SharedUnknowns
+from rig.arrays import Array, Index
+from rig.model.chain import Chain
+from rig.protocol.protocol import Run
 
 EXTRA = ("contact", "drag")
 """Columns behind those of the rods: height of the contact point, m, and κ of the air, 1/m."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,28 +12,24 @@ from rig.analysis.averages import by_case
 from rig.analysis.comparison import Comparison, compare
 from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import GOOD, Measured, good_runs
+from rig.analysis.session import Analysis
 from rig.analysis.unknowns import SharedUnknowns, prior_air
+from rig.arrays import Array
 from rig.estimate import coefficients as of
 from rig.estimate.alphas import SingleAlphas, single_alphas
+from rig.estimate.coefficients import CoefficientProblem
 from rig.estimate.curves import DropCurves, drop_curves
 from rig.estimate.end_correction import EndCorrection, end_correction
 from rig.estimate.hypotheses import AIR, CONTACT_U
+from rig.estimate.hypothesis_fit import HypothesisFit
 from rig.estimate.posterior import Posterior, posterior
 from rig.estimate.quadratic_forms import merge_like, quadratic_form
 from rig.estimate.rods import Impulses, impulses, resolution
+from rig.protocol.protocol import Protocol
 from rig.reasons import make_reason, rig_error
 from rig.sections import Sections
 from rig.threads import one_thread
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from rig.analysis.session import Analysis
-    from rig.arrays import Array
-    from rig.estimate.coefficients import CoefficientProblem
-    from rig.estimate.hypothesis_fit import HypothesisFit
-    from rig.protocol.protocol import Protocol
-    from rig.units import Quantity
+from rig.units import Quantity
 
 
 class Coefficient(NamedTuple):

@@ -16,21 +16,16 @@ At κ = 0 every number is that of `rig.model.fall`.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import lru_cache
 from itertools import accumulate
 from math import atanh, cos, exp, expm1, inf, log, log1p, radians, sinh, sqrt, tanh
 from operator import mul
-from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
-from rig.model.fall import Fall, checked_fall, free_leg
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from rig.model.chain import Chain
-    from rig.model.fall import Leg
+from rig.model.chain import Chain
+from rig.model.fall import Fall, Leg, checked_fall, free_leg
 
 
 def leg_drags(chain: Chain, drags: Sequence[float]) -> list[float]:

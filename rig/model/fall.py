@@ -8,17 +8,14 @@ two heights. Δz then keeps full relative precision as α → 0, and g → 0 cos
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
+from rig.model.chain import Chain
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+Leg = Callable[[float, float, float, int], tuple[float, float]]
 
-    from rig.model.chain import Chain
-
-    Leg = Callable[[float, float, float, int], tuple[float, float]]
 
 SMALL, LARGE = 1e-100, 1e100
 """Range of sizes whose squares are floats."""

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
+from rig.model.chain import Chain
 from rig.model.fall import Fall, fall, free_leg, kicks
 from rig.model.impact import MU, impact_on, stated_coefficients, with_coefficients
 from rig.model.prediction import PredictedIncline
+from rig.model.surface import Surface
 from rig.units import Quantity
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from rig.model.chain import Chain
-    from rig.model.surface import Surface
 
 AT_REST = Quantity(0.0)
 LEAST = {MU: 0.0}

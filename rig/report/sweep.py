@@ -3,28 +3,22 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from rig.measurands import SEPARATION, SPEED
+from rig.measurands import SEPARATION, SPEED, Measurand
+from rig.model.batch import Floats
 from rig.reasons import rig_error
-from rig.report.figure import WIDE_PT, Trace, chart
+from rig.report.figure import WIDE_PT, Chart, Trace, chart
 from rig.report.looks import INK, MUTED
 from rig.report.templates import render
-from rig.sweep.compute import PILE
+from rig.sweep.compute import PILE, Swept
+from rig.sweep.layout import Layout
 from rig.sweep.variables import VARIABLES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from rig.measurands import Measurand
-    from rig.model.batch import Floats
-    from rig.report.figure import Chart
-    from rig.sweep.compute import Swept
-    from rig.sweep.layout import Layout
 
 _LEVELS = 7
 _SPAN = 0.995

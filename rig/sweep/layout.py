@@ -4,25 +4,21 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from rig.errors import InputError
+from rig.model.batch import Floats
+from rig.model.chain import Chain
+from rig.model.surface import Pile
 from rig.protocol.fields import did_you_mean
+from rig.protocol.protocol import Protocol
 from rig.reasons import rig_error
 from rig.sweep.variables import VARIABLES, scene_values
 from rig.units import UnitError, parse, quote
-
-if TYPE_CHECKING:
-    from collections.abc import Container, Iterable, Iterator, Sequence
-
-    from rig.model.batch import Floats
-    from rig.model.chain import Chain
-    from rig.model.surface import Pile
-    from rig.protocol.protocol import Protocol
 
 MOST_POINTS = 20_000_000
 """Their results take 17 bytes each, all in memory until the file is written."""

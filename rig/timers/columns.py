@@ -7,19 +7,29 @@ Facts are collected of each column (of its heading, its unit, its values), and t
 from __future__ import annotations
 
 import itertools
+import re
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.timers import vocabulary
 from rig.timers.moments import TICK_HZ
-from rig.timers.vocabulary import POWERS, SYMBOLS, find_label, form, is_number, normal, words
+from rig.timers.table import Row, RowBlock
+from rig.timers.vocabulary import (
+    POWERS,
+    SYMBOLS,
+    find_label,
+    form,
+    is_number,
+    normal,
+    unit_of,
+    words,
+)
 
 if TYPE_CHECKING:
-    from rig.timers.table import Row, RowBlock
     from rig.timers.timer_file import TimerFile
 
 SAMPLED = ("level", "volts")
@@ -31,6 +41,12 @@ _NOWHERE = sys.maxsize
 """Of a column that there is not."""
 _FORMS = "whole", "bit", "count", "fraction", "stamp"
 """Kinds of cells, beside those that `rig.timers.vocabulary.kinds_of` knows."""
+_NO_ROLES = {"high", "low", "one", "zero", "unknown", "missing", "gate letter"}
+"""Of words that say nothing of a column: those of cells, and letters without a number."""
+_COUNTER_BITS = 30, 32
+"""Of counters: those of MicroPython, and of an Arduino."""
+_MOST_OPEN = 3
+"""Columns of which several roles are tried."""
 _MANY = 4
 """Up to which columns are counted."""
 
@@ -61,8 +77,10 @@ class TimerColumn:
         ``blocked`` or ``clear`` where the heading says what all its times did to the beam.
     numbered
         Whether it is one of times side by side: ``t1``, ``Stop 2``.
-    wrap
-        Where a counter of µs or ms in 32 bits begins anew, ps; 0 for others.
+    wraps
+        Where a counter of µs or ms may begin anew, ps.
+    words
+        What two unknown words mean, for which falls decide: the one that begins is ``high``.
     """
 
     at: int
@@ -73,13 +91,15 @@ class TimerColumn:
     run: str = ""
     state: str = ""
     numbered: bool = False
-    wrap: int = 0
+    wraps: tuple[int, ...] = ()
+    words: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def meaning(self) -> str:
         """What it was taken for, in words."""
         meaning = " or ".join(roles()[role][0] for role in self.role.split("|"))
-        return meaning + f" in {SYMBOLS[self.power]}" * (self.role == "time")
+        meaning += f" in {SYMBOLS[self.power]}" * (self.role == "time")
+        return meaning + "".join(f": {word!r} is high" for word in [*self.words][:1])
 
 
 ROW_COUNT = TimerColumn(-1, "", "index")
@@ -126,14 +146,17 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     if width > _MOST_COLUMNS:
         limits = {"columns": width, "limit": _MOST_COLUMNS}
         file.problems.refuse(rows[0].line, 1, "too_many_columns", **limits)
-    heading = block.find_heading(width)
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
     facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
+    heading = block.find_heading(width)
+    is_counted = facts.keys() >= {0, width - 1} and "counts" in facts[0]
+    if heading and is_counted and len(heading.texts) < width:
+        heading = heading._replace(texts=["", *heading.texts])  # numbers of rows have no name
     shared = {f"table.{fact}" for fact in set().union(*facts.values())}
     states = sum("all.state" in fact for fact in facts.values())
     shared |= {f"columns.{min(len(facts), _MANY)}", f"states.{min(states, _MANY)}"}
     shared |= {"rated"} if block.find_time_base() else set()
-    columns = [_read_heading(block, heading, n, fact | shared) for n, fact in facts.items()]
+    columns = [_read_column(block, heading, n, facts[n] | shared, cells[n]) for n in facts]
     if heading is None:
         for row in block.headings:
             if row.known > 1 and len(row.texts) > width:
@@ -156,72 +179,90 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
 
 
 def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
-    """Decide between roles that columns may have by those that others have."""
+    """Decide between roles that columns may have by those that others have.
+
+    Of roles that are possible each is taken once; falls decide which way is that of the file.
+    """
     there = {column.role for column in columns}
     meant = {"elapsed": "duration" if "time" in there else "time"}
     meant |= {"level": "state"} if "state" in there else {}  # the same, without a name
     meant |= {"level": "volts"} if "volts" in there else {}  # those that are 0 at first
-    # Two that may be the same two are one each; of others, falls cannot decide.
     unclear = [column for column in columns if "|" in column.role]
-    readings = unclear[0].role.split("|") if unclear else []
-    is_open = len({c.role for c in unclear}) == 1 and len(unclear) in {1, len(readings)}
-    file.ways = max(file.ways, len(readings) * is_open)
-    for n, column in enumerate(unclear):
-        column.role = readings[(file.way + n) % len(readings)] if is_open else "setting"
+    readings = [column.role.split("|") for column in unclear]
+    ways = [
+        way
+        for way in itertools.product(*readings if len(unclear) <= _MOST_OPEN else [[]])
+        if all(role == "other" or (role not in there and way.count(role) == 1) for role in way)
+    ] or [("setting",) * len(unclear)]
+    file.ways = max(file.ways, len(ways))
+    file.is_guess |= len(ways) > 1
+    for column, role in zip(unclear, ways[file.way % len(ways)], strict=True):
+        column.role = role
     for column in columns:
         column.role = meant.get(column.role, column.role)
         file.has_unit &= column.role != "time" or column.power is not None
 
 
-def _read_heading(block: RowBlock, heading: Row | None, n: int, facts: set[str]) -> TimerColumn:
-    """Find out what a column is by its heading; the other rows above it may say unit or gate."""
+def _read_column(
+    block: RowBlock, heading: Row | None, n: int, facts: set[str], cells: Sequence[str]
+) -> TimerColumn:
+    """Find out what a column is; the rows above its heading, or its cells, may say the unit."""
     name = heading.cell(n) if heading else ""
-    column = TimerColumn(n, name or f"column {n + 1}", run=find_label(name, "run"))
+    column = TimerColumn(n, name or f"column {n + 1}", run=_heading_label(block, heading, n, "run"))
     prefix, _, rest = name.partition(":")
     if rest.strip() and not find_label(prefix, "gate"):
         column.run, name = column.run or prefix.strip(), rest
     bare = vocabulary.without_accents(name).replace(column.run, "")
-    texts = (bare, *(row.cell(n) for row in reversed(block.headings) if row.has_units))
-    units = list(map(vocabulary.unit_of, texts))
+    above = (row.cell(n) for row in reversed(block.headings) if row.has_units)
+    units = list(map(unit_of, (bare, *above, *cells[: "all.timed" in facts])))
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
-    above = (_cell_above(row, n) for row in block.headings if row is not heading)
-    labels = (find_label(text, "gate") for text in (name, *above))
     rows = (row for row in block.headings if form("row of numbers").fullmatch(row.raw))
-    column.gate = next(filter(None, (*labels, *(row.cell(n) for row in rows))), "")
+    numbers = next((row.cell(n) for row in rows), "")
+    column.gate = _heading_label(block, heading, n, "gate") or numbers
+    roles_of_name = vocabulary.roles_in(bare)
     named = {
         "time": unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"],
         "timed": unit in POWERS,
         "volt": unit == "v",
         "unitless": not unit,
         "strange": unit not in {*POWERS, "v", ""} and not find_label(unit, "gate"),
-        "bare": not name,
+        "bare": not (roles_of_name - _NO_ROLES or unit or column.gate or column.run),
+        "named": name,
         "first": not n,
         "labelled": column.gate,
         "numbered": column.run,
     }
-    facts |= vocabulary.roles_in(bare) | _held(named)
+    facts |= roles_of_name | _held(named)
     column.role = next(
         role
         for role, rule in vocabulary.read_rows("columns.txt", ":")
         if all((fact.lstrip("-") in facts) is (fact[0] != "-") for fact in rule.split())
     )
     if column.role in {"time", "elapsed"}:
-        column.power = 0 if "all.stamp" in facts else POWERS.get(unit)
+        column.power = POWERS.get(unit, 0 if "all.stamp" in facts else None)
         column.state = next((state for state in ("clear", "blocked") if state in facts), "")
         column.numbered = "moment" in facts
         if {"all.count", "far"} <= facts and column.power in {3, 6}:
-            column.wrap = 2**32 * TICK_HZ // 10**column.power
+            column.wraps = tuple(2**bits * TICK_HZ // 10**column.power for bits in _COUNTER_BITS)
+    if column.role == "edge" and {"pair", "all.state"} & facts == {"pair"}:
+        column.words = dict(zip(dict.fromkeys(cells), ("high", "low"), strict=True))
     return column
 
 
-def _cell_above(row: Row, n: int) -> str:
-    """Return the cell of a row above the heading; of merged cells only the first has a text.
+def _heading_label(block: RowBlock, heading: Row | None, n: int, role: str) -> str:
+    """Return the gate or run of a column that its heading names, or a row above that.
 
-    The last of them is as wide as the widest other: what is beyond belongs to none.
+    Of merged cells only the first has a text. The last of them is as wide as the widest other: what
+    is beyond belongs to none.
     """
-    grouped = [at for at, text in enumerate(row.texts) if find_label(text, "gate")]
-    width = max((b - a for a, b in itertools.pairwise(grouped)), default=1)
-    return next(filter(None, reversed(row.texts[max(0, n + 1 - width) : n + 1])), "")
+    labels = [find_label(heading.cell(n), role)] if heading else []
+    for row in block.headings:
+        if row is not heading:
+            grouped = [at for at, text in enumerate(row.texts) if find_label(text, role)]
+            width = max((b - a for a, b in itertools.pairwise(grouped)), default=0)
+            cells = reversed(row.texts[max(0, n + 1 - width) : n + 1])
+            labels.append(find_label(next(filter(None, cells), ""), role))
+    return next(filter(None, labels), "")
 
 
 def _facts_of_values(texts: Sequence[str]) -> set[str]:
@@ -244,6 +285,7 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
             "far": len(numbers) > 1 and abs(numbers[-1] - numbers[0]) > 100,
             "few": "all.whole" in facts and len(texts) >= 2 * len(set(texts)),
             "constant": len(set(texts)) == 1 < len(texts),
+            "pair": len(set(texts)) == 2 and not re.search("[0-9]", "".join(set(texts))),
             "many": len(texts) > 30,
         }
     )
@@ -264,18 +306,17 @@ def pair_columns(columns: Sequence[TimerColumn]) -> list[Signal]:
     is_sampled, pairs = chosen == SAMPLED, list[Signal]()
     for clock in times:
         own = [column for column in columns if _clock_of(column, times) is clock]
-        places = {} if is_sampled else {c.role: c.at for c in [*columns[::-1], *own[::-1]]}
+        places = {} if is_sampled else {c.role: c.at for c in columns[::-1]}
         names = places.get("run", _NOWHERE), places.get("gate", _NOWHERE)
         values = [column for column in own if column.role in chosen]
+        if not values and not is_sampled:
+            values = [replace(clock, at=_NOWHERE, role="moment")]
         labels = Counter(map(_label_of, values))
         for n, value in enumerate(values, 1):
             is_beside = is_sampled or len(values) > 1
             label = _label_of(value) if is_beside else clock.gate or value.gate
             label += f" ({n})" if is_sampled and labels[label] > 1 else ""
             pairs.append(Signal(clock, value, clock.run or value.run, label, *names))
-        if not values and not is_sampled:
-            moment = replace(clock, at=_NOWHERE, role="moment")
-            pairs.append(Signal(clock, moment, clock.run, clock.gate, *names))
     return pairs
 
 

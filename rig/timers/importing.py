@@ -30,6 +30,8 @@ Fit = Callable[[FileReading, bool], "FallMatch"]
 
 _GOOD = 0.75
 """Share of the edges near a fall's, of all that came or were due, that makes a reading credible."""
+_GOOD_GUESS = 0.95
+"""The same where falls decide which columns are used."""
 _DECISIVE = 7.0
 """Logarithm of the odds beyond which a reading is taken without a question: 1,000 to 1."""
 _FINALISTS = 6
@@ -174,12 +176,13 @@ def _choose(
     distinct = [*{x.key: x for x in reversed(readings)}.values()][::-1]
     if len(distinct) == 1 and "channels" in stated:
         return distinct[0], fit(distinct[0], True)
+    good = _GOOD_GUESS if any(x.file.is_guess for x in distinct) else _GOOD
     rough = sorted(((fit(x, False), x) for x in distinct), key=lambda row: -row[0].share)
-    likely = [x for match, x in rough if match.share >= _GOOD]
+    likely = [x for match, x in rough if match.share >= good]
     exact = [(fit(x, True), x) for x in likely[:_FINALISTS]]
     # The first row of a log of changes is the state at the beginning, unless falls say that.
     prior = {"state": 0.0, "change": -_DECISIVE}
-    ranked = [row for row in exact if row[0].share >= _GOOD]
+    ranked = [row for row in exact if row[0].share >= good]
     ranked = [row for row in ranked if row[1].layout.dark != "inverted" or "dark" in stated]
     ranked.sort(key=lambda row: -row[0].evidence - prior[row[1].layout.first])
     if not ranked:

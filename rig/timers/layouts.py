@@ -195,8 +195,7 @@ def group_changes(
     named = np.array([-1 if (n := number_of(x)) is None else n for x in file.names])
     numbers = named[changes["run"][starts]]
     numbers += np.any(numbers == 0)  # a file may count its runs from 0
-    _, known = np.unique(numbers, return_index=True)
-    is_first = np.isin(np.arange(len(numbers)), known)
+    is_first = count_before(numbers) == 0
     return changes, drops, np.where(is_first, np.maximum(numbers, 0), 0)
 
 
@@ -227,7 +226,9 @@ def find_layouts(
     stated
         What is decided: attributes of `FileLayout`.
     """
-    state, groups = file.changes["state"], _groupings(file, gates, bars)
+    state, is_wire = file.changes["state"], len(file.labels) < 2 and bars == 1 < len(gates)
+    groups = ["runs", *["unsorted"] * file.is_stacked, *["rows", "columns"] * file.is_wide]
+    groups += ["passing"] * is_wire
     changes, drop, _ = group_changes(file, "", groups[0], 0.0)
     most = 1 + count_before(drop * len(file.names) + changes["label"]).max(initial=0)
     is_signal = np.any(state > STATES.index("blocked"))
@@ -246,13 +247,6 @@ def find_layouts(
         pauses = [float(stated["pause_s"])] if "pause_s" in stated else pauses
         for channels, pause in itertools.product(maps, pauses):
             yield replace(layout, channels=channels, pause_s=pause)
-
-
-def _groupings(file: TimerFile, gates: Sequence[int], bars: int) -> list[str]:
-    """Return how changes may be put into runs."""
-    groups = ["runs", *["unsorted"] * file.is_stacked, *["rows", "columns"] * file.is_wide]
-    is_wire = len(file.labels) < 2 and bars == 1 and len(gates) > 1
-    return groups + ["passing"] * is_wire
 
 
 @lru_cache(4)
@@ -286,8 +280,7 @@ def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list
     later = file.changes[~file.changes["first"]][::-1]
     first = dict(zip(later["label"].tolist(), later["tick"], strict=True))
     passed = sorted(labels, key=lambda label: first.get(file.names[label], 0))
-    numbered = sorted(labels, key=lambda label: (number_of(label) or 0, label))
     chosen = [*itertools.combinations(gates, len(labels))][:_MOST_MAPS]
-    maps = [dict(zip(numbered, sorted(beams), strict=True)) for beams in chosen[:1]]
+    maps = [dict(zip(labels, sorted(beams), strict=True)) for beams in chosen[:1]]
     maps += [x for beams in chosen if (x := dict(zip(passed, beams, strict=True))) != maps[0]]
     return maps or [by_number] * bool(by_number)

@@ -31,15 +31,17 @@ def moment(text: str, power: int = 0) -> int | None:
     int or None
         `None` for what is no such time.
     """
-    if text[-1:] == "s" and (timed := form("timed").fullmatch(text)):
+    if not text[-1:].isdigit() and (timed := form("timed").fullmatch(text)):
         text, power = timed[1].replace(",", "."), POWERS[unit_of(timed[2])]
     if ":" not in text or (match := form("clock").fullmatch(text)) is None:
         return picoseconds(text, -power)
-    first, mark, second, third, hours, minutes, rest = match.groups("0")
-    days = 0
+    first, mark, middle, third, past, hours, minutes, rest, half = match.groups("0")
+    days, hour = int(past), int(hours)
+    if half != "0":
+        hour = hour % 12 + 12 * (half in "pP")
     if int(third):
         # Only how many days lie between two times matters: which part is the year is enough.
-        parts = [int(first), int(second), int(third)]
+        parts = [int(first), int(middle), int(third)]
         year, month, day = parts if len(first) > 2 else parts[::-1]
         if mark == "/" and parts[0] <= 12:
             month, day = parts[:2]
@@ -47,8 +49,9 @@ def moment(text: str, power: int = 0) -> int | None:
             days = date(year, month, day).toordinal()
         except ValueError:
             return None
-    ticks = picoseconds(rest.replace(",", ".")) or 0
-    return (60 * (24 * days + int(hours)) + int(minutes)) * 60 * TICK_HZ + ticks
+    second, *digits = rest.replace(",", ".").split(".")
+    ticks = picoseconds(f"{second}.{''.join(digits)}") or 0
+    return (60 * (24 * days + hour) + int(minutes)) * 60 * TICK_HZ + ticks
 
 
 def picoseconds(text: str, power: int = 0) -> int | None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 from array import array
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -15,20 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.reasons import make_reason
-from rig.timers.columns import SAMPLED, columns_of, pair_columns, roles
+from rig.timers.columns import SAMPLED, TimerColumn, columns_of, pair_columns, roles
 from rig.timers.crossings import find_crossings, find_threshold
 from rig.timers.moments import TICK_HZ, moment
+from rig.timers.table import Row
 from rig.timers.vocabulary import is_number, state_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from rig.timers.columns import TimerColumn
-    from rig.timers.table import Row
     from rig.timers.timer_file import TimerFile
 
 MAX_EVENTS = 500_000
 """Those of 600 drops of 25 rods past 16 gates; what has more is no record of drops."""
+_TURN = 600 * TICK_HZ
+"""Picoseconds from a time to the next within which a counter is taken to have begun anew."""
 STATES = ("", "clear", "blocked", "low", "high")
 """What begins with a change, of a beam or of a signal; nothing where the file does not say."""
 _REJECTED = len(STATES)
@@ -70,13 +70,14 @@ class SignalReader:
         self.clocks = list(dict.fromkeys(signal.clock for signal in self.signals))
         used = {column.role for column in columns}
         values = [signal.value.at for signal in self.signals if signal.value.role != "moment"]
-        filled = sum(row.cell(at) != "" for row in sample for at in values)
-        is_filled = len(values) == 1 or 2 * filled >= (len(values) + 1) * len(sample)
+        filled = {x.at: sum(row.cell(x.at) != "" for row in sample) for x in columns}
+        total = sum(filled[at] for at in values)
+        is_filled = len(values) == 1 or 2 * total >= (len(values) + 1) * len(sample)
         self.has_times = "time" in used
         self.has_names = not used.isdisjoint({"gate", "run"}) or bool(values)
-        self.sparse = {
-            n for n, x in enumerate(self.signals) if len(values) > 1 and x.value.role != "moment"
-        }
+        named = {at for x in self.signals for at in x[-2:]}
+        self.above = {at: "" for at in named & filled.keys() if 2 * filled[at] <= len(sample)}
+        file.is_guess |= bool(self.above)
         self.is_sampled = "volts" in used or ("level" in used and is_filled)
         self.is_whole = is_filled and (self.is_sampled or len(values) > len(self.clocks))
         needed = {at for x in self.signals for at in (x.clock.at, x.value.at, *x[-2:])}
@@ -107,7 +108,8 @@ class SignalReader:
             is_read = False
             for n, signal in enumerate(self.signals):
                 word, tick = row.cell(signal.value.at), ticks[signal.clock.at]
-                if tick is not None and (word or n not in self.sparse):
+                is_said = word or self.is_sampled or signal.value.role == "moment"
+                if tick is not None and is_said:
                     self._read_value(n, row, word, tick)
                     is_read = True
             file.unread += [] if is_read else [row.line]
@@ -141,8 +143,9 @@ class SignalReader:
         if clock.role != "time":
             tick = round(self.base[0] * TICK_HZ + self.base[1] * tick)
         latest = self.latest.get(clock.at, tick)
-        if clock.wrap:
-            tick += clock.wrap * max(0, round((latest - tick) / clock.wrap))
+        for wrap in clock.wraps if tick < latest else ():
+            pause = (tick - latest) % wrap
+            tick = latest + pause if pause < _TURN else tick
         if self.is_sampled and tick < latest:
             self.file.problems.add(*row.place(clock.at), "time", "backwards", text=text)
         self.starts.setdefault(clock.at, tick)
@@ -157,24 +160,30 @@ class SignalReader:
             offset = tick - self.starts[signal.clock.at]
             self.samples[n].extend((row.line, offset, float(word)))
             return
-        state = code_of(value.role, word or value.state)
+        state = code_of(value.role, value.words.get(word, word) or value.state)
         if state == _REJECTED:
             self._reject(row, value, word)
         elif state or not self.is_sampled:
-            run = names.setdefault(row.cell(signal.run_at) or signal.run, len(names))
+            run = names.setdefault(self._read_name(row, signal.run_at) or signal.run, len(names))
             before, self.values[n] = self.values.get(n), (state, run, block.number)
             if self.is_whole and before == self.values[n]:
                 return
-            label = row.cell(signal.gate_at) or signal.label or block.gate
+            label = self._read_name(row, signal.gate_at) or signal.label or block.gate
             key = n, block.number, run, names.setdefault(label, len(names))
             # A first row may be the state at the beginning of a run, and no change.
-            is_start = self.is_whole or (state == STATES.index("clear") and tick == 0)
-            is_first = is_start and key not in self.keys
+            is_first = self.is_whole and key not in self.keys
             self.keys.add(key)
             clock = 0 if signal.clock.numbered or signal.label else signal.clock.at
             self.changes.append(
                 (row.line, tick, 0, state, key[-1], run, clock, block.number, is_first)
             )
+
+    def _read_name(self, row: Row, at: int) -> str:
+        """Return what a row says of its run or gate; of merged cells only the first has a text."""
+        name = row.cell(at) or self.above.get(at, "")
+        if at in self.above:
+            self.above[at] = name
+        return name
 
     def _find_crossings(self, n: int) -> Changes:
         """Return where volts cross the middle; note how many do, or that nothing passes."""

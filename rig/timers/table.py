@@ -21,6 +21,8 @@ from rig.timers.vocabulary import LONGEST, form, is_measured, is_number, kinds_o
 
 TimeBase = tuple[float, float]
 """When the first sample was taken, and the time between two, s."""
+_Name = tuple[str, int]
+"""Words before a value, and how many values with the same are before it in its line."""
 _COLUMN_ROLES = {
     *("time", "elapsed", "state", "edge", "volts"),
     *("gate", "run", "duration", "index", "derived"),
@@ -46,7 +48,7 @@ class RowBlock:
         Headings of the block before.
     number
         How many are before it, but for those of other gates in the same run.
-    gate
+    run, gate
         Which all its rows are of; empty where no mark says so.
     headings
         Its own, without such marks.
@@ -59,6 +61,7 @@ class RowBlock:
     remarks: list[Row] = field(default_factory=list)
     above: list[Row] = field(default_factory=list)
     number: int = 0
+    run: str = ""
     gate: str = ""
     headings: list[Row] = field(default_factory=list)
     width: int = 0
@@ -72,7 +75,9 @@ class RowBlock:
         self.key = width, *(tuple(row.texts) for row in self.headings)
 
     def find_heading(self, width: int) -> Row | None:
-        """Return the row with most cells that are known; above and below may stand symbols, units.
+        """Return the row with most cells that are known, the lowest of those with most names.
+
+        Above and below may stand symbols and units.
 
         A row with a measured number, or with more or fewer names than there are columns, is a
         setting. A remark may name the columns where nothing else does.
@@ -85,9 +90,9 @@ class RowBlock:
             if row.known
             and len(row.texts) > width - 2  # rows may end with a separator
             and all(_UNFILLED & roles_in(text) for text in filter(None, row.texts[width:]))
-            and (is_numbered(row.raw) or not any(map(is_measured, row.texts[:width])))
+            and (is_numbered(row.raw) or not any(map(_is_value, row.texts[:width])))
         ]
-        return max(rows, key=lambda row: (row.known, len("".join(row.texts))), default=None)
+        return max(rows[::-1], key=lambda row: (row.known, len({*row.texts})), default=None)
 
     def find_time_base(self) -> TimeBase | None:
         """Return the first sample's time and the step, s, that settings state; `None` without."""
@@ -179,12 +184,13 @@ class Table:
 
     def __init__(self, lines: Iterable[tuple[int, str]]) -> None:
         self.remarks, self.strays = list[Row](), list[Row]()
+        self._parts = dict[tuple[str, str], int]()
         unwrapped = (pair for number, line in lines for pair in _unwrap(number, line))
         sample = list(itertools.islice(unwrapped, _SAMPLE))
         self._lines = itertools.chain(sample, unwrapped)
         plain = [line for _, line in sample if line.strip() and not vocabulary.is_remark(line)]
-        self._names = _find_names(plain[-_JUDGED:])
-        self.separator = find_separator(plain, self._names)
+        self._names, named = _find_names(plain[-_JUDGED:])
+        self.separator = find_separator(plain, named)
         self._usual: tuple[tuple[bool, bool], ...] = ()
         shapes = Counter(x for x in (_shape(self.split(y)) for y in plain) if any(map(all, x)))
         self._fewest = 1 + (2 * sum(n for x, n in shapes.items() if len(x) > 1) > shapes.total())
@@ -201,7 +207,7 @@ class Table:
         """
         if not self.separator:
             values = dict(_named_values(line))
-            return [values.get(name, "") for name in self._names] if any(values) else [line]
+            return [values.get(name, "") for name in self._names] if values else [line]
         cells = split_cells(line, self.separator, len(self._usual))
         if is_plain and (self.separator == "," or "," not in line):
             return cells
@@ -212,7 +218,8 @@ class Table:
     def rows(self) -> Iterator[Row]:
         """Yield each row of data."""
         block, is_plain = RowBlock(self.remarks, []), form("plain row").fullmatch
-        block.headings += [Row(0, self._names, "", block)] if not self.separator else []
+        names = [name for name, _ in self._names]
+        block.headings += [Row(0, names, "", block)] if not self.separator else []
         for number, line in self._lines:
             if not line.strip():
                 continue
@@ -223,9 +230,7 @@ class Table:
             text = line[mark.end() :].rstrip('" ') if mark else line
             row = Row(number, self.split(text), line, block)
             if row.is_mark if mark or not block.width else self._begins_block(row):
-                gate = vocabulary.find_label(line, "gate") if row.is_mark else ""
-                above = block.headings if block.width else [*block.above, *block.headings]
-                block = RowBlock(self.remarks, above[:_SAMPLE], block.number + (not gate), gate)
+                block = self._next_block(block, line if row.is_mark else "")
                 block.headings += [] if row.is_mark else [row]
             elif mark:
                 self.remarks += [row] if number <= _SAMPLE else []
@@ -237,6 +242,19 @@ class Table:
                 if len(block.headings) > _SAMPLE:
                     return
                 (self.strays if block.width else block.headings).append(row)
+
+    def _next_block(self, last: RowBlock, mark: str) -> RowBlock:
+        """Return the block below a mark; what marks below each other say holds together."""
+        run, gate = vocabulary.find_label(mark, "run"), vocabulary.find_label(mark, "gate")
+        number = last.number + (not gate or bool(run))
+        if not last.width:
+            run, gate = run or last.run, gate or last.gate
+        if run and (run, gate) not in self._parts:
+            # Parts of a run may be those of its gates.
+            number = next((n for (name, _), n in self._parts.items() if name == run), number)
+            self._parts[run, gate] = number
+        above = last.headings if last.width else [*last.above, *last.headings]
+        return RowBlock(self.remarks, above[:_SAMPLE], number, run, gate)
 
     def _begins_block(self, row: Row) -> bool:
         """Whether a row below others is a mark, or a heading, of further ones."""
@@ -257,6 +275,11 @@ class Table:
         above = (x.texts for x in row.block.headings if len(x.texts) == x.known)
         widths = {row.block.width, *map(len, above)}
         return any(map(is_number, row.texts)) and len(row.texts) in widths
+
+
+def _is_value(text: str) -> bool:
+    """Whether a cell has a measured number, perhaps of an input that it names: ``CH1:2E-04``."""
+    return is_measured(text.removeprefix(vocabulary.find_label(text, "gate")).lstrip(":= "))
 
 
 def split_cells(line: str, separator: str, usual: int = 0) -> list[str]:
@@ -281,31 +304,33 @@ def _unwrap(number: int, line: str) -> list[tuple[int, str]]:
     return [(number, form("list").sub("", piece, 1).rstrip("])}, ;")) for piece in pieces]
 
 
-def _named_values(line: str) -> list[tuple[str, str]]:
+def _named_values(line: str) -> list[tuple[_Name, str]]:
     """Return the values between the words of a line, each with the words right before it."""
-    values, end = [], 0
+    values, end, counts = [], 0, Counter[str]()
     for match in form("value").finditer(line[:LONGEST]):
-        name = form("value name").search(line[end : match.start()])
-        values.append((name[1].strip() if name else "", match[0].replace(",", ".")))
+        named = form("value name").search(line[end : match.start()])
+        name = named[1].strip() if named else ""
+        values.append(((name, counts[name]), match[0].replace(",", ".")))
+        counts[name] += 1
         end = match.end()
     return values
 
 
-def _find_names(lines: Sequence[str]) -> list[str]:
-    """Return what most lines name before their values; nothing if they name none, or one."""
+def _find_names(lines: Sequence[str]) -> tuple[list[_Name], int]:
+    """Return what most lines name before their values, and how many values they name so."""
     rows = [tuple(name for name, _ in _named_values(line)) for line in lines]
     usual, count = Counter(filter(None, rows)).most_common(1)[0] if any(rows) else ((), 0)
-    is_named = len(set(usual) - {""}) > 1 and 2 * count > sum(map(bool, rows))
-    return list(dict.fromkeys(usual)) if is_named else []
+    is_named = any(name[1:] for name, _ in usual) and 2 * count > sum(map(bool, rows))
+    return ([*usual], count * len(usual)) if is_named else ([], 0)
 
 
-def find_separator(lines: Sequence[str], names: Sequence[str]) -> str:
+def find_separator(lines: Sequence[str], named: int) -> str:
     """Find what stands between the cells: what leaves most values in the lines with a number.
 
     Parameters
     ----------
-    names
-        Words before values, if these may stand between words; then nothing is between them.
+    named
+        How many values stand between words; where most do, nothing else is between them.
     """
     rows = [line[:1000] for line in lines if re.search("[0-9]", line[:1000])][-_JUDGED:]
     is_named = any(re.search("[A-Za-z][A-Za-z0-9]", line) and "," in line for line in lines[:200])
@@ -316,7 +341,7 @@ def find_separator(lines: Sequence[str], names: Sequence[str]) -> str:
     ]
     if 2 * len(numbers) > len(rows) and not is_named and sorted(numbers, key=float) == numbers:
         return ";"  # times go on with decimal commas; 0,25 below 1,5 is no decimal comma
-    counts = {"": (sum(len(_named_values(row)) for row in rows), 0)} if names else {}
+    counts = {"": (named, 0)} if named else {}
     marks = [mark for mark in "\t;|" if 2 * sum(mark in row for row in rows) > len(rows)]
     for mark in marks or ", ":
         cells = [kinds_of(text) for row in rows for text in split_cells(row, mark) if text]

@@ -54,6 +54,8 @@ class TimerFile:
         Whether it has samples: a level that changes may be of an input that is no gate.
     is_wide
         Whether a row has several times, so that it may be a run.
+    is_guess
+        Whether falls decide which columns are used, or rows lack the name of their run or gate.
     has_runs
         Whether rows say their run, which may go on in another block.
     rows
@@ -76,6 +78,7 @@ class TimerFile:
     has_unit: bool = True
     is_sampled: bool = False
     is_wide: bool = False
+    is_guess: bool = False
     has_runs: bool = False
     rows: int = 0
     unread: list[int] = field(default_factory=list)

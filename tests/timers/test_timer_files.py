@@ -88,7 +88,6 @@ faults = partial(faults_of, read)
         ("Time,State\n0.1,x\n0.2,0\n", (2, 5, "state")),
         ("0.1,x\n0.2,0\n", (1, 5, "edge")),
         ("Time,Blocked\n0.1,low\n0.2,0\n0.3,1\n", (2, 5, "state")),
-        ("Time,State\n0.2,1\n0.3\n", (3, 1, "state")),
         ("Distance,State\n0.2,1\n", (1, 1, "")),
         ("", (1, 1, "")),
         ("nothing here\n", (1, 1, "")),
@@ -170,7 +169,8 @@ def test_stacked_runs_are_runs_of_their_own(tmp_path):
     [
         ("t,x,y\n0.1,0,1\n0.14,0,2\n0.18,0,3\n0.22,0,4\n0.26,0,5\n", "regular_samples",
          "samples at regular times"),
-        ("Time (s),colour,mood\n" + "".join(f"0.{n},{n % 3},{n % 2}\n" for n in range(9)),
+        ("Time (s),colour,mood,taste,smell\n" + "".join(
+            f"0.{n}" + f",{n % 3}" * 4 + "\n" for n in range(9)),
          "not_accepted", "'colour' is not a heading that is understood"),
         ("Run,Time between gates (s)\n1,0.1\n2,0.1\n", "durations", "are durations"),
         ("Time (s),Volt\n" + "".join(f"{n},{n % 2 * 1e-3 + n % 7 * 1e-3}\n" for n in range(40)),
