@@ -21,6 +21,7 @@ def vcd_rows(lines: Iterator[tuple[int, str]], problems: ProblemList) -> Iterato
         if "$enddefinitions" in line or len(head) > _LONGEST_HEAD:
             break
     scale, names = form("time scale").search(head), dict(form("wire").findall(head))
+    listed = {*form("variable").findall(head)}
     if scale is None or not names:
         lacks = "a $timescale of 1, 10 or 100 s to ps, or without a wire of one bit"
         problems.refuse(1, 1, "no_rate", lacks=lacks)
@@ -41,3 +42,5 @@ def vcd_rows(lines: Iterator[tuple[int, str]], problems: ProblemList) -> Iterato
         elif (wire := word[1:]) in levels and changes.setdefault(wire, word[0]) != word[0]:
             accepted = "a change: this wire has another value at this time already"
             problems.reject(number, 1, names[wire], word, accepted)
+        elif word[0] in "01" and number and wire not in listed:
+            problems.reject(number, 1, "wire", word, "a change of a wire that $var lists")
