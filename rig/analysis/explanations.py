@@ -322,9 +322,8 @@ class Explainer:
         occam: float = 0.0,
     ) -> Explanation:
         evidence = self._evidence(reading, premise.hz) - CLEAR - occam
-        whole = well_read(reading.fit, by_chance=True)
-        whole = whole and not self._suggests_fault(reading.fit, premise)
-        return Explanation(fault, values, evidence, whole)
+        complete = well_read(reading.fit) and not self._suggests_fault(reading.fit, premise)
+        return Explanation(fault, values, evidence, complete)
 
 
 @dataclass(frozen=True)

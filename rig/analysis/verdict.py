@@ -8,10 +8,11 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from rig.analysis.annealing import MISSED
 from rig.analysis.chain_records import SIDES
 from rig.analysis.diagnoses import gate_reasons
+from rig.analysis.distributions import most_by_chance
 from rig.analysis.edge_classes import UnmatchedEdge
 from rig.analysis.equations import STRAY
 from rig.analysis.fit import Fit
-from rig.analysis.identify import RESTLESS, most_missed
+from rig.analysis.identify import RESTLESS
 from rig.analysis.inclines import other_incline
 from rig.analysis.last_passages import APART, disagreements
 from rig.analysis.result import Audit, DropResult, Measured, Verdict
@@ -83,8 +84,8 @@ def _counts(protocol: Protocol, audit: Audit) -> Iterator[Reason]:
     accept, words = protocol.accept, protocol.vocabulary
     missed, expected, limit = audit.missed, audit.edge_count, accept.missed_edges
     if missed > limit * expected:
-        few = missed <= most_missed(expected, limit)
-        code = "edges_missed_few" if few else "edges_missed"
+        chance = most_by_chance(expected, min(MISSED, limit / 2.0))
+        code = "edges_missed" if missed > chance else "edges_missed_few"
         yield make_reason(code, words, missed=missed, expected=expected, limit=limit)
     surplus, received, limit = audit.unexplained, audit.received, accept.unexplained_edges
     if surplus > limit * received:
