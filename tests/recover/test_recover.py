@@ -306,6 +306,15 @@ def test_a_lost_protocol_must_be_given(fences, copy, truth, tmp_path):
     assert "the protocol file" in missing
 
 
+def test_an_altered_protocol_must_be_given(fences, copy, truth, tmp_path):
+    alter(copy, "UPDATE protocol SET text = text || '# later'")
+    with pytest.raises(SessionError, match="has lost its protocol file"):
+        save(examine(copy), tmp_path / "new")
+    again, missing = saved(copy, tmp_path, protocol=str(fences.with_name("fences.yaml")))
+    assert again["protocol"] == truth["protocol"]
+    assert any("has changed since" in line for line in missing)
+
+
 def test_what_may_be_simulated_is_stamped_so(copy, tmp_path):
     alter(copy, UNSAID, "DELETE FROM identity")
     again, missing = saved(copy, tmp_path)
