@@ -5,6 +5,7 @@ In a table, what begins with ``#`` explains it to whoever edits it.
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 
@@ -28,6 +29,7 @@ def read_paragraphs(module: str, name: str = "") -> list[list[str]]:
     return [paragraph.splitlines() for paragraph in paragraphs if paragraph[0] != "#"]
 
 
+@cache
 def read_rows(module: str, name: str = "", mark: str | None = "|") -> list[list[str]]:
     """Return the rows of a table, one a line, by cells without the blanks around them.
 

@@ -240,7 +240,8 @@ class Pairing:
         heights, speeds
             Height and speed of the chain at each observed edge, by the current fit.
         scale
-            Standard deviation of the height between an edge and its level, m.
+            Standard deviation of the height between an edge and its level, m; shape
+            ``(expected,)``.
 
         Returns
         -------

@@ -55,7 +55,7 @@ class DropFit:
 
     @property
     def begun(self) -> Begun:
-        """What a fit of the drop at another time scale begins with."""
+        """α, matches and unknowns, to be kept or to begin another fit with."""
         return Begun(self.model.alpha, self.matches, self.x)
 
     @property

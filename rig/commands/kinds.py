@@ -10,16 +10,16 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from rig import ready, text_rows, timers
 from rig.boards import GATES
 from rig.files import check_new, check_place
-from rig.ready import find_protocol
 
 
 class _ListFormats(argparse.Action):
     """Print the formats of timers' files that are known, and stop."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        rows = import_module("rig.timers.vocabulary").read_rows("formats.txt", "|")
+        rows = text_rows.read_rows(timers.__file__, "formats.txt")
         print("\n".join(f"{name}: {how}; {example}" for name, how, example in rows))
         parser.exit()
 
@@ -100,7 +100,7 @@ KINDS: dict[str, dict[str, Any]] = {
         lambda text: import_module("rig.usb.listing").sole_port() if text == "auto" else text,
         bool,
     ),
-    "protocol": {"type": find_protocol},
+    "protocol": {"type": ready.find_protocol},
     "text": _accept("words", str, str.strip),
     "seconds": _accept("a time in seconds above 0", float, lambda s: 0.0 < s < math.inf),
     "seed": _accept("a whole number from 0 to 2^63", int, lambda n: 0 <= n < 1 << 63),

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
+from rig.text_rows import read_rows
 from rig.timers import vocabulary
 from rig.timers.moments import TICK_HZ
 from rig.timers.table import Row, RowBlock
@@ -54,7 +55,7 @@ _MANY = 4
 @cache
 def roles() -> dict[str, list[str]]:
     """Return of each role its meaning, a cell's form, what is accepted, and what 0 and 1 mean."""
-    return {name: row for name, *row in vocabulary.read_rows("roles.txt", " |")}
+    return {name: row for name, *row in read_rows(__file__, "roles.txt", " |")}
 
 
 @dataclass(eq=False, slots=True)
@@ -216,9 +217,9 @@ def _read_column(
     above = (row.cell(n) for row in reversed(block.headings) if row.has_units)
     units = list(map(unit_of, (bare, *above, *cells[: "all.timed" in facts])))
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
-    rows = (row for row in block.headings if form("row of numbers").fullmatch(row.raw))
-    numbers = next((row.cell(n) for row in rows), "")
-    column.gate = _heading_label(block, heading, n, "gate") or numbers
+    is_numbers = form("row of numbers").fullmatch
+    numbers = (row.cell(n) for row in block.headings if is_numbers(row.raw))
+    column.gate = _heading_label(block, heading, n, "gate") or next(numbers, "")
     roles_of_name = vocabulary.roles_in(bare)
     named = {
         "time": unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"],
@@ -235,7 +236,7 @@ def _read_column(
     facts |= roles_of_name | _held(named)
     column.role = next(
         role
-        for role, rule in vocabulary.read_rows("columns.txt", ":")
+        for role, rule in read_rows(__file__, "columns.txt", ":")
         if all((fact.lstrip("-") in facts) is (fact[0] != "-") for fact in rule.split())
     )
     if column.role in {"time", "elapsed"}:

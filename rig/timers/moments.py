@@ -41,7 +41,7 @@ def moment(text: str, power: int = 0) -> int | None:
         hour = hour % 12 + 12 * (half in "pP")
     if int(third):
         # Only how many days lie between two times matters: which part is the year is enough.
-        parts = [int(first), int(middle), int(third)]
+        parts = [*map(int, (first, middle, third))]
         year, month, day = parts if len(first) > 2 else parts[::-1]
         if mark == "/" and parts[0] <= 12:
             month, day = parts[:2]

@@ -180,10 +180,10 @@ class SignalReader:
 
     def _read_name(self, row: Row, at: int) -> str:
         """Return what a row says of its run or gate; of merged cells only the first has a text."""
-        name = row.cell(at) or self.above.get(at, "")
-        if at in self.above:
-            self.above[at] = name
-        return name
+        if at not in self.above:
+            return row.cell(at)
+        self.above[at] = row.cell(at) or self.above[at]
+        return self.above[at]
 
     def _find_crossings(self, n: int) -> Changes:
         """Return where volts cross the middle; note how many do, or that nothing passes."""

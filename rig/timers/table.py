@@ -92,7 +92,7 @@ class RowBlock:
             and all(_UNFILLED & roles_in(text) for text in filter(None, row.texts[width:]))
             and (is_numbered(row.raw) or not any(map(_is_value, row.texts[:width])))
         ]
-        return max(rows[::-1], key=lambda row: (row.known, len({*row.texts})), default=None)
+        return max(reversed(rows), key=lambda row: (row.known, len({*row.texts})), default=None)
 
     def find_time_base(self) -> TimeBase | None:
         """Return the first sample's time and the step, s, that settings state; `None` without."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator
 
 from rig.timers.problems import ProblemList
@@ -21,19 +20,13 @@ def vcd_rows(lines: Iterator[tuple[int, str]], problems: ProblemList) -> Iterato
         if "$enddefinitions" in line or len(head) > _LONGEST_HEAD:
             break
     scale, names = form("time scale").search(head), dict(form("wire").findall(head))
-    listed = {*form("variable").findall(head)}
     if scale is None or not names:
         lacks = "a $timescale of 1, 10 or 100 s to ps, or without a wire of one bit"
         problems.refuse(1, 1, "no_rate", lacks=lacks)
     unit = f"e-{(POWERS | {'ps': 12})[scale[2]] - scale[1].count('0')}"
     yield 0, ",".join(["time (s)", *names.values()])
     at, time, levels, changes = 0, "0", dict.fromkeys(names, "x"), dict[str, str]()
-    words = (
-        (number, word)
-        for number, line in itertools.chain(lines, [(0, "#0")])
-        for word in (line.split() if not line.startswith("$comment") else ())
-    )
-    for number, word in words:
+    for number, word in _words(lines):
         if word[0] == "#" and word[1:].isdecimal():
             if at or changes:
                 levels |= changes
@@ -42,5 +35,16 @@ def vcd_rows(lines: Iterator[tuple[int, str]], problems: ProblemList) -> Iterato
         elif (wire := word[1:]) in levels and changes.setdefault(wire, word[0]) != word[0]:
             accepted = "a change: this wire has another value at this time already"
             problems.reject(number, 1, names[wire], word, accepted)
-        elif word[0] in "01" and number and wire not in listed:
+        elif word[0] in "01" and wire not in levels:
             problems.reject(number, 1, "wire", word, "a change of a wire that $var lists")
+
+
+def _words(lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+    """Yield times and changes of single bits: no comments, and no vectors with their wires."""
+    is_comment = False
+    for number, line in lines:
+        for word in form("vector").sub("", line).split():
+            is_comment = word == "$comment" or (is_comment and word != "$end")
+            if not is_comment:
+                yield number, word
+    yield 0, "#0"  # ends the last time

@@ -6,7 +6,7 @@ import re
 import unicodedata
 from functools import cache, lru_cache
 
-from rig import text_rows
+from rig.text_rows import read_rows
 
 POWERS = {"s": 0, "ms": 3, "us": 6, "ns": 9}
 """Decimal power from seconds, by the unit's name."""
@@ -20,15 +20,9 @@ _FAMILIES = {"blocked": "beam", "clear": "beam", "high": "signal", "low": "signa
 
 
 @cache
-def read_rows(name: str, mark: str) -> list[list[str]]:
-    """Return the rows of a table beside this module, their cells parted by a mark."""
-    return text_rows.read_rows(__file__, name, mark)
-
-
-@cache
 def words() -> dict[str, frozenset[str]]:
     """Return the words of each role in `vocabulary.txt`."""
-    rows = read_rows("vocabulary.txt", ":")
+    rows = read_rows(__file__, "vocabulary.txt", ":")
     return {role: frozenset(map(str.strip, listed.split(","))) for role, listed in rows}
 
 
@@ -40,7 +34,7 @@ def form(name: str) -> re.Pattern[str]:
 
 @cache
 def _expand(name: str) -> str:
-    forms, role = dict(read_rows("forms.txt", " ; ")), name.removeprefix("long ")
+    forms, role = dict(read_rows(__file__, "forms.txt", " ; ")), name.removeprefix("long ")
     if name in forms or role not in words():
         within = forms.get(name, name)
         return re.sub("<([a-z ]+)>", lambda match: f"(?:{_expand(match[1])})", within)

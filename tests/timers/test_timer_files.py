@@ -240,6 +240,18 @@ def test_a_flicker_is_no_record_of_drops(tmp_path, monkeypatch, content):
     assert faults(tmp_path, content)
 
 
+def test_of_a_dump_only_changes_of_unlisted_wires_are_refused(tmp_path):
+    """Not numbers in a comment, nor wires of a vector or of a real number, whatever their names."""
+    path = tmp_path / "dump.vcd"
+    head = (
+        "$timescale 1 us $end\n$var wire 1 ! D0 $end\n$var wire 4 1a bus $end\n"
+        "$var real 64 0 volts $end\n$enddefinitions $end\n$comment\n100\n$end\n"
+    )
+    path.write_text(f"{head}#0 0! b0101 1a\nr1.5 0\n#400 1!\n#500 0!\n", "utf-8")
+    assert len(read_file(TimerFile(path)).changes) == 3
+    assert faults(tmp_path, f"{head}#0 0!\n#400 1!\n#500 0!\n1a\n") == [(12, 1, "wire")]
+
+
 def test_a_line_longer_than_any_text_s_is_refused_at_its_place(tmp_path):
     assert faults(tmp_path, "time (s),state\n0.1,1\n" + "1" * 20_001 + "\n") == [(3, 1, "")]
 
