@@ -261,7 +261,7 @@ class RunResult(_Quantities):
     ----------
     quantities
         By JSON name, with value, u, `expanded` (95 %), degrees of freedom and budget.
-    run, attempt, incline_deg, impact_chain
+    run, attempt, incline_deg, impact_chain, setting
         Which it was.
     verdict, reasons
         ``accepted``, ``marginal``, ``void`` or ``rejected``, and why.
@@ -284,13 +284,15 @@ class RunResult(_Quantities):
         self.attempt = drop.attempt
         self.incline_deg = drop.run.incline_deg
         self.impact_chain = drop.run.impact
+        self.setting = drop.run.setting
         self.verdict: str = drop.verdict
         self.reasons = tuple(reason.text for reason in drop.reasons)
         self.gates = drop.gates
         self.session = session
 
     def __repr__(self) -> str:
-        at = f" at {self.incline_deg:g}°, {self.impact_chain} strikes" if self.impact_chain else ""
+        strikes = self.impact_chain and f"{self.incline_deg:g}°, {self.impact_chain} strikes"
+        at = "".join(f" at {words}" for words in (strikes, self.setting) if words)
         values = f": {self._written()}" if self.quantities else ""
         return f"<run {self.run}{at}, {self.verdict}{values}>"
 
@@ -302,7 +304,7 @@ class MeanResult(_Quantities):
     ----------
     quantities
         Means by JSON name.
-    incline_deg, impact_chain, n
+    incline_deg, impact_chain, setting, n
         What it is of, and how many runs.
     predicted
         What the model says, with its u; nothing outside its domain.
@@ -310,13 +312,13 @@ class MeanResult(_Quantities):
 
     def __init__(self, line: Incline) -> None:
         super().__init__(line.means)
-        self.incline_deg = line.incline_deg
-        self.impact_chain = line.impact_chain
+        self.incline_deg, self.impact_chain, self.setting = line.condition
         self.n = line.n
         self.predicted = line.predicted
 
     def __repr__(self) -> str:
-        return f"<{self.incline_deg:g}°, mean of {self.n}: {self._written()}>"
+        at = f"{self.incline_deg:g}°{self.setting and f', {self.setting}'}"
+        return f"<{at}, mean of {self.n}: {self._written()}>"
 
 
 class Results:

@@ -23,10 +23,15 @@ if TYPE_CHECKING:
 
 
 def predictions(protocol: Protocol) -> list[PredictedIncline]:
-    """Predict each incline of the plan and, where chains are unlike, each that strikes.
+    """Predict each incline and setting of the plan and, where chains are unlike, each that strikes.
 
     One alone where nothing is struck.
     """
+    scenes = protocol.settings.items()
+    return [replace(line, setting=at) for at, scene in scenes for line in _predict_scene(scene)]
+
+
+def _predict_scene(protocol: Protocol) -> list[PredictedIncline]:
     if protocol.surface is None:
         return [_free_fall(protocol)]
     inclines, unlike = dict.fromkeys(protocol.plan.inclines), protocol.unlike_chains
@@ -71,6 +76,7 @@ def predict_incline(protocol: Protocol, incline_deg: float, struck: str) -> Pred
 
 def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
     """What the model says of one run, by JSON name; nothing where it has no answer."""
+    protocol = protocol.of(run)
     if run.impact is None:
         row = GRAVITY if protocol.track is None else ACCELERATION
         return {row.name: protocol.gravity}
@@ -93,6 +99,7 @@ def coefficient_slopes(protocol: Protocol, run: Run) -> dict[str, dict[str, floa
 
     What else a prediction is made from, measuring needs too: the drop's own equations know that.
     """
+    protocol = protocol.of(run)
     if run.impact is None:
         return {name: {"gravity": model.u} for name, model in predicted_run(protocol, run).items()}
     from rig.model.impact import ALPHA  # noqa: PLC0415 - only where something is struck

@@ -104,6 +104,10 @@ class ChainLab:
     ----------
     series
         Which drops of the same rig: those of another series are others.
+    others
+        The same rig in the other settings that the plan varies, by setting.
+    made
+        Falls that were made ahead, by label; of all settings.
 
     Raises
     ------
@@ -121,15 +125,20 @@ class ChainLab:
         tell: Callable[[Truth], None] = lambda _: None,
     ) -> None:
         check_released(protocol)
+        scenes = [*protocol.settings.items()][1:]
+        self.others = {at: type(self)(scene, dials, seed, tell) for at, scene in scenes}
         self.protocol = protocol
         self.seed = seed
         self.dials = dials = dials.on(protocol, self._share)
         self.tell = tell
         self.series = 0
         self.runs = {run.number: run for run in runs(protocol)}
+        self.made: dict[int, Falls] = {}
         self.gates = protocol.gates.gates
-        rig = self._rng("rig")
-        self.hang_height = protocol.drop.value + protocol.drop.u * dials.drop_error * rig.normal()
+        self.hang_height = self._hang_height()
+        for setting, other in self.others.items():
+            other.runs, other.made = self.runs, self.made
+            other.hang_height = other._hang_height(setting)
         self.surface = self._surface()
         self.side = dials.side_sd * float(self._rng("side").normal())
         self.air = air(protocol, dials.drag)
@@ -167,6 +176,11 @@ class ChainLab:
             Quantity(max(0.0, friction.value)),
             pile,
         )
+
+    def _hang_height(self, *setting: str) -> float:
+        """Draw the height at which chains hang: each setting of a plan has an error of its own."""
+        drop, error = self.protocol.drop, self._rng("rig", *setting).normal()
+        return drop.value + drop.u * self.dials.drop_error * float(error)
 
     def _level(self, run: Run) -> float:
         """How far above the zero of all heights the chain strikes, m."""
@@ -206,16 +220,20 @@ class ChainLab:
             )
         return self.runs[number], attempt
 
+    def _lab(self, label: int) -> ChainLab:
+        """Return the rig in the setting of a drop's run."""
+        return self.others.get(self._run(label)[0].setting, self)
+
     def rest(self, label: int) -> int:
         """Mask of the beams that the hanging chains block."""
         if is_test(label):
             return 0
-        run, _ = self._run(label)
-        mask, hanging = 0, self.hanging(run)
-        for gate in self.gates:
+        lab = self._lab(label)
+        mask, hanging = 0, lab.hanging(self._run(label)[0])
+        for gate in lab.gates:
             if (body := hanging.get(gate.side)) is not None:
-                middles = self.hang_height + body.offsets + self._shift(body, gate)
-                if np.any(np.abs(middles - self.heights[gate.channel]) < body.widths / 2):
+                middles = lab.hang_height + body.offsets + lab._shift(body, gate)
+                if np.any(np.abs(middles - lab.heights[gate.channel]) < body.widths / 2):
                     mask |= 1 << gate.channel
         return mask
 
@@ -228,6 +246,8 @@ class ChainLab:
         """Let go: every edge in order of time, as (seconds after fire, channel, blocked)."""
         if is_test(label):
             return []
+        if (lab := self._lab(label)) is not self:
+            return lab.drop(label)
         run, attempt = self._run(label)
         hung, dials = self._hung(run, attempt), self.dials
         falls, rng = self._fall(run, attempt, hung), hung.rng

@@ -77,10 +77,7 @@ class ResolvedLab(ChainLab):
             _check(spec)
         if self.surface is not None:
             _bounce(self.surface, self.dials)
-        self._made: dict[int, Falls] = {}
-        kinds = {
-            (run.incline_deg, run.impact, run.free): number for number, run in self.runs.items()
-        }
+        kinds = {run.kind: number for number, run in self.runs.items()}
         chains_by_run = [self._hang_safely(pack_label(number, 1)) for number in kinds.values()]
         longest = max(sum(map(processor_time, chains.values())) for chains in chains_by_run)
         if longest > TOLD_S:
@@ -89,16 +86,16 @@ class ResolvedLab(ChainLab):
 
     def make_ahead(self, labels: Sequence[int]) -> None:
         """Make drops on all processors, and wait for them."""
-        jobs = [(*self._run(label), self._hung(*self._run(label))) for label in labels]
+        jobs = [(self._lab(label), *self._run(label)) for label in labels]
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            falls = pool.map(lambda job: self._fall(*job), jobs)
-            self._made |= zip(labels, falls, strict=True)
+            falls = pool.map(lambda job: job[0]._fall(*job[1:], job[0]._hung(*job[1:])), jobs)
+            self.made |= zip(labels, falls, strict=True)
 
     def _fall(self, run: Run, attempt: int, hung: Hung) -> Falls:
         """Let the chains of a drop fall, unless they already have."""
         label = pack_label(run.number, attempt)
-        if label in self._made:
-            return self._made[label]
+        if label in self.made:
+            return self.made[label]
         chains = self._hang_safely(label)
         falls = {side: self.let_fall(chain) for side, chain in chains.items()}
         truth = self._resolved_truth(run, attempt, hung, falls)

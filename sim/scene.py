@@ -74,7 +74,8 @@ def set_scene(scheme: str, settings: Mapping[str, str]) -> Scene:
     if path is not None:
         _check_writable(scheme, path)
     lab = hang_chains(reader.read(source), dials, seed, partial(append_truth, path))
-    lab.series = series
+    for each in (lab, *lab.others.values()):
+        each.series = series
     return Scene(lab, dials, seed, pace)
 
 

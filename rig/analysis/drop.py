@@ -19,10 +19,11 @@ from rig.analysis.gravity import free_gravity
 from rig.analysis.identify import DropIdentity, few_edges, identify, pattern_faults
 from rig.analysis.joint_fit import by_itself
 from rig.analysis.last_passages import last_passages
+from rig.analysis.owners import suffixes
 from rig.analysis.result import GOOD, Audit, Deviation, DropResult
 from rig.analysis.verdict import is_wrong, judge, judge_record, verdict_of
 from rig.clock.calibration import TimeScale
-from rig.protocol.contact import at_contact
+from rig.protocol.contact import of_run
 from rig.protocol.protocol import Protocol, Run
 from rig.reasons import make_reason
 from rig.records import Drop
@@ -123,7 +124,9 @@ class DropCase:
         if fitted is None:
             return None
         case = replace(self._at_contact(), aside=summary.aside)
-        return DropFit(case._model(fitted.alpha), fitted.matches, fitted.x)
+        model = case._model(fitted.alpha)
+        model.owners = suffixes(self.protocol, self.run)
+        return DropFit(model, fitted.matches, fitted.x)
 
     @one_thread
     def read(
@@ -158,8 +161,7 @@ class DropCase:
         return stated._judge(*with_all, readings, explain=explain)
 
     def _at_contact(self) -> DropCase:
-        run = self.run
-        return replace(self, protocol=at_contact(self.protocol, run.incline_deg, run.impact))
+        return replace(self, protocol=of_run(self.protocol, self.run))
 
     @cached_property
     def records(self) -> list[ChainRecord]:

@@ -43,9 +43,10 @@ class Effects(Record):
         of the sides: the delay of the free side's release.
     """
 
-    MEMBERS = "incline_deg blocks chain side chains"
+    MEMBERS = "incline_deg setting? blocks chain side chains"
 
     incline_deg: float
+    setting: str
     chains: tuple[str, str]
     blocks: int
     chain: Mapping[str, Measured]
@@ -71,8 +72,9 @@ def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects,
     order = [first, second, second, first]
     good = {result.run: result for result in good_runs(results)}
     signs = np.array([1.0, -1.0, -1.0, 1.0])  # first chain less second, for each run of a block
-    planned, every = sorted(planned_runs(protocol), key=attrgetter("incline_deg")), []
-    for incline, group in groupby(planned, attrgetter("incline_deg")):
+    case = attrgetter("incline_deg", "setting")
+    planned, every = sorted(planned_runs(protocol), key=case), []
+    for (incline, setting), group in groupby(planned, case):
         runs = [*group]
         fours = zip(*(runs[place::4] for place in range(4)), strict=False)
         blocks = [
@@ -85,7 +87,7 @@ def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects,
             rows = [row for row in MEASURANDS.values() if row.name in blocks[0][0].quantities]
             chain = {r.name: _effect(blocks, r.name, signs / 2.0) for r in rows if r.by_chain}
             side = {r.name: _effect(blocks, r.name, signs**2 / 4.0) for r in rows if r.by_side}
-            every.append(Effects(incline, (first, second), len(blocks), chain, side))
+            every.append(Effects(incline, setting, (first, second), len(blocks), chain, side))
     return tuple(every)
 
 

@@ -196,9 +196,9 @@ class DropResult(Record):
     """
 
     MEMBERS = (
-        "run=run.number attempt incline_deg=run.incline_deg impact_chain=run.impact damaged? "
-        "*quantities edges=audit unexplained_edges=audit.unexplained *causes gates? scatter? "
-        "last_passages? alone? learned verdict *explained degrees budget"
+        "run=run.number attempt incline_deg=run.incline_deg impact_chain=run.impact "
+        "setting=run.setting? damaged? *quantities edges=audit unexplained_edges=audit.unexplained "
+        "*causes gates? scatter? last_passages? alone? learned verdict *explained degrees budget"
     )
 
     run: Run

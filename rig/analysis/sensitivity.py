@@ -6,8 +6,9 @@ do: a stated scatter has little weight if the drops determine it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
+from functools import partial
 from typing import Any
 
 from rig.analysis.budgets import Budgets
@@ -34,12 +35,12 @@ def prior_sensitivity(analysis: Analysis) -> list[dict[str, Any]]:
     if not analysis.adjusted:
         return []
     protocol = next(iter(analysis.adjusted.values())).model.protocol
-    protocol = protocol.stated or protocol
-    unchanged = _again(protocol, analysis)
+    unchanged = _again(lambda stated: stated, analysis)
     rows = []
     for name, place in _priors(protocol).items():
         wider, narrower = (
-            _again(_scale_at(protocol, place, by), analysis) for by in (FACTOR, 1.0 / FACTOR)
+            _again(partial(_scale_at, place=place, by=by), analysis)
+            for by in (FACTOR, 1.0 / FACTOR)
         )
         # A prior whose joint fit did not converge is left out.
         for line, *changed in zip(unchanged, wider, narrower, strict=False):
@@ -52,9 +53,13 @@ def prior_sensitivity(analysis: Analysis) -> list[dict[str, Any]]:
     return rows
 
 
-def _again(protocol: Protocol, analysis: Analysis) -> tuple[Incline, ...]:
-    """Return the summary with the priors of another protocol; empty if the fit diverges."""
-    fits = [replace(drop, model=drop.model.under(protocol)) for drop in analysis.adjusted.values()]
+def _again(change: Callable[[Protocol], Protocol], analysis: Analysis) -> tuple[Incline, ...]:
+    """Return the summary with the priors of changed protocols; empty if the fit diverges."""
+    fits = []
+    for drop in analysis.adjusted.values():
+        protocol = drop.model.protocol
+        model = drop.model.under(change(protocol.stated or protocol))
+        fits.append(replace(drop, model=model))
     joints = [joint_fit(fits)] if analysis.joint else [by_itself(alone(fit)) for fit in fits]
     if analysis.joint and not joints[0].settled:
         return ()

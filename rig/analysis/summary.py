@@ -32,14 +32,17 @@ class GateMeans(Record):
         Number of runs.
     speed_sd, interval_sd
         Standard deviations between runs, m/s and s; `None` for a single one.
+    setting
+        What else the plan varies.
     """
 
-    MEMBERS = "*mean speed_sd_m_s=speed_sd? interval_sd_s=interval_sd? n"
+    MEMBERS = "*mean speed_sd_m_s=speed_sd? interval_sd_s=interval_sd? n setting?"
 
     mean: GatePassage
     n: int
     speed_sd: float | None
     interval_sd: float | None
+    setting: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,12 +51,12 @@ class Incline:
 
     Attributes
     ----------
+    condition
+        Condition of its runs.
     means, deviations
         Mean and standard deviation between runs of each measurand, by JSON name.
     predicted
         The model's value of each measurand; missing outside its domain.
-    impact_chain
-        Name of the striking chain, if chains differ.
     differences
         Each mean less the model's value.
     causes
@@ -62,20 +65,14 @@ class Incline:
         Mean passages of a single object through the gates.
     """
 
-    incline_deg: float
+    condition: Condition
     n: int
     means: dict[str, Measured]
     deviations: dict[str, float]
     predicted: dict[str, Quantity]
-    impact_chain: str | None = None
     differences: Mapping[str, Difference] = field(default_factory=dict)
     causes: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     gates: tuple[GateMeans, ...] = ()
-
-    @property
-    def condition(self) -> Condition:
-        """Condition of its runs."""
-        return Condition(self.incline_deg, self.impact_chain)
 
     def normalized_error(self, name: str) -> float | None:
         """Return E_n of a measurand, see `Difference`; `None` without a prediction."""
@@ -129,12 +126,11 @@ def _incline(
         if line.condition == condition
     }
     return Incline(
-        run.incline_deg,
+        condition,
         len(results),
         {name: mean(runs) for name, runs in values.items()},
         {name: sd for name, runs in values.items() if (sd := _scatter(runs)) is not None},
         {name: model for name, model in predicted_run(protocol, run).items() if name in names},
-        condition.impact_chain,
         differences,
         {name: _causes(runs) for name, runs in values.items()},
         tuple(_gate_means(results)),
@@ -142,15 +138,16 @@ def _incline(
 
 
 def _gate_means(results: Sequence[DropResult]) -> Iterator[GateMeans]:
-    """Yield the mean passage of each gate, from the top down."""
-    by_channel: dict[int, list[GatePassage]] = {}
-    for passage in (gate for result in results for gate in result.gates):
-        by_channel.setdefault(passage.channel, []).append(passage)
-    for runs in sorted(by_channel.values(), key=lambda gate_runs: -gate_runs[0].height_m):
+    """Yield the mean passage of each gate, from the top down, in each setting."""
+    passages: dict[tuple[int, str], list[GatePassage]] = {}
+    for result in results:
+        for gate in result.gates:
+            passages.setdefault((gate.channel, result.run.setting), []).append(gate)
+    for (_, setting), runs in sorted(passages.items(), key=lambda item: -item[1][0].height_m):
         speeds = [passage.speed for passage in runs]
         since = [passage.interval for passage in runs if passage.interval is not None]
         at = replace(runs[0], speed=mean(speeds), interval=mean(since) if since else None)
-        yield GateMeans(at, len(runs), _scatter(speeds), _scatter(since))
+        yield GateMeans(at, len(runs), _scatter(speeds), _scatter(since), setting)
 
 
 def _scatter(values: Sequence[Measured]) -> float | None:

@@ -57,6 +57,6 @@ def rest_s(settle_s: float, clock_u: float | None) -> float:
 def describe_setup(run: Run) -> str:
     """Tell the operator what goes where before a drop."""
     if run.impact is None:
-        return f"put {run.free} at its start, at rest"
+        return f"put {run.free} at its start{run.setting and f' ({run.setting})'}, at rest"
     chains = f"impact side: {run.impact} · free side: {run.free}"
-    return f"incline {run.incline_deg:g}° · {chains if run.free else f'hang {run.impact}'}"
+    return f"incline {run.set_up} · {chains if run.free else f'hang {run.impact}'}"

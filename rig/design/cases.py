@@ -16,7 +16,7 @@ from rig.analysis.square_root import EquationRows
 from rig.analysis.unknowns import SharedUnknowns
 from rig.arrays import Array, Index
 from rig.estimate.hypotheses import model_alpha
-from rig.protocol.contact import at_contact
+from rig.protocol.contact import of_run
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol, Run
 from rig.records import Drop
@@ -83,11 +83,11 @@ def cases(protocol: Protocol, components: Components) -> tuple[Case, ...]:
     components
         How much everything scatters.
     """
-    counts = Counter(replace(run, number=0) for run in runs(protocol))
+    counts = Counter(run.kind for run in runs(protocol))
     kinds = sorted(counts, key=lambda run: (run.incline_deg, str(run.impact)))
     models = []
     for run in kinds:
-        model, x = predict_drop(at_contact(protocol, run.incline_deg, run.impact), run, components)
+        model, x = predict_drop(of_run(protocol, run), run, components)
         seen = perfect(model, x)
         models.append((DropModel(model.protocol, seen, CLOCK_U, components), x))
     shared = SharedUnknowns(model for model, _ in models)

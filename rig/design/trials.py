@@ -27,7 +27,7 @@ from rig.analysis.identify import (
     pattern_faults,
 )
 from rig.design.cases import CLOCK_U, perfect, predict_drop, with_edges
-from rig.protocol.contact import at_contact
+from rig.protocol.contact import of_run
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol, Run
 from rig.threads import one_thread
@@ -70,11 +70,11 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
         How many, in turn at all inclines and with either chain where they are unlike.
     """
     rng = np.random.default_rng(_SEED)
-    kinds = {(run.incline_deg, run.impact, run.free): run for run in reversed(runs(protocol))}
+    kinds = {run.kind: run for run in reversed(runs(protocol))}
     read, failing = 0, Counter[str]()
     further_gate: tuple[str, float] | None = None
     for run in islice(cycle(kinds.values()), drops):
-        protocol_here = at_contact(protocol, run.incline_deg, run.impact)
+        protocol_here = of_run(protocol, run)
         fallen = _fall(protocol_here, run, rng)
         identification, wrong = read_drop(protocol_here, fallen, 0.0)
         read += not wrong
@@ -150,11 +150,13 @@ def margin(protocol: Protocol) -> float:
     The least over the outermost inclines, with chains hung higher or lower than stated and every
     edge seen where it should be; no more than `MARGIN`.
     """
-    ends = {run.incline_deg: run for run in reversed(runs(protocol))}
-    least = MARGIN
-    for incline in {min(ends), max(ends)}:
-        here = at_contact(protocol, incline, ends[incline].impact)
-        model, x = predict_drop(here, ends[incline], priors(here))
+    cases = {(run.incline_deg, run.setting): run for run in reversed(runs(protocol))}
+    least, inclines = MARGIN, [incline for incline, _ in cases]
+    for run in cases.values():
+        if min(inclines) < run.incline_deg < max(inclines):
+            continue
+        here = of_run(protocol, run)
+        model, x = predict_drop(here, run, priors(here))
         for off in (-_OFF, _OFF):
             x[model.unknowns["drop"]] = off * protocol.drop.u
             identification, unclear = read_drop(here, perfect(model, x))

@@ -20,7 +20,7 @@ from rig.measurands import SEPARATION
 from rig.model.fall import kicks
 from rig.model.impact import impact_on
 from rig.predictions import air_of
-from rig.protocol.contact import at_contact, higher_contacts
+from rig.protocol.contact import higher_contacts, of_run
 from rig.protocol.protocol import Protocol, Run, Side
 
 POINTS = 120
@@ -139,7 +139,7 @@ def model_fall(protocol: Protocol, run: Run, role: Side) -> Trajectory:
     DomainError
         Where Eq. 13 has no finite solution at the run's incline.
     """
-    protocol = at_contact(protocol, run.incline_deg, run.impact)
+    protocol = of_run(protocol, run)
     name = run.impact if role == "impact" else run.free or run.impact
     assert name is not None
     rods, gravity = protocol.chains[name], protocol.gravity.value

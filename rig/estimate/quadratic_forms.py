@@ -138,9 +138,9 @@ def merge_like(forms: Sequence[QuadraticForm]) -> list[QuadraticForm]:
 
     Drops are alike where the same chain strikes at the same incline. The run kept is the first.
     """
-    groups: dict[tuple[object, ...], list[QuadraticForm]] = {}
+    groups: dict[Run, list[QuadraticForm]] = {}
     for form in forms:
-        groups.setdefault((form.run.incline_deg, form.run.impact, form.run.free), []).append(form)
+        groups.setdefault(form.run.kind, []).append(form)
     return [
         group[0]._replace(
             rows=EquationRows(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -167,6 +167,9 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
     """
     if protocol.surface is None:
         raise rig_error("impacts_absent")
+    scenes = [replace(scene, drop=protocol.drop) for scene in protocol.settings.values()]
+    if any(scene != scenes[0] for scene in scenes):
+        raise rig_error("impacts_varied", keys="; ".join(protocol.variants))
     good = {result.job: result.run for result in analysis.runs if result.verdict in GOOD}
     drops = {key: analysis.adjusted[key] for key in good if key in analysis.adjusted}
     if not drops:

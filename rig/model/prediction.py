@@ -12,8 +12,8 @@ class PredictedIncline:
 
     Attributes
     ----------
-    incline_deg, impact_chain
-        Incline, and name of the striking chain if chains differ.
+    incline_deg, impact_chain, setting
+        Incline, name of the striking chain if chains differ, and what else the plan varies.
     model, alpha, gamma
         Name of the model, and the coefficients of Eq. 9.
     separation_m, separation_u_m, speed_m_s, speed_u_m_s
@@ -29,6 +29,7 @@ class PredictedIncline:
 
     incline_deg: float
     impact_chain: str | None = None
+    setting: str = ""
     model: str
     alpha: float | None = None
     gamma: float | None = None
@@ -45,12 +46,13 @@ class PredictedIncline:
 
     @property
     def label(self) -> str:
-        """Incline and, if chains differ, name of the striking chain."""
-        return f"{self.incline_deg:g}°{f' {self.impact_chain}' if self.impact_chain else ''}"
+        """Incline, name of the striking chain if chains differ, and what else is set."""
+        chain = f" {self.impact_chain}" if self.impact_chain else ""
+        return f"{self.incline_deg:g}°{chain}{self.setting and f', {self.setting}'}"
 
     def json(self) -> dict[str, Any]:
         """Return the object that ``rig predict --json`` prints, without absent quantities."""
         absent = {"struck", "fall_time_u_s"}
         absent |= set() if self.struck else {"separation_u_m", "speed_u_m_s"}
-        absent |= set() if self.impact_chain else {"impact_chain"}
+        absent |= {name for name in ("impact_chain", "setting") if not getattr(self, name)}
         return {name: value for name, value in asdict(self).items() if name not in absent}

@@ -7,6 +7,7 @@ Rules for single keys are in `rig.protocol.keys`; those for the rods of a chain 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from math import prod
 
 from rig.protocol.contact import lacking_geometry
 from rig.protocol.fields import DEFAULTS, Section
@@ -85,7 +86,10 @@ def _check_plan(plan: Section, *, struck: bool, turns: bool) -> None:
             plan.faults.add(item.place, f"{plan.key('incline')}[{n}]", message)
         elif inclines[n] is not None:
             lines[inclines[n]] = item.place.line
-    runs = len(inclines) * plan["repeats"] if plan.is_sound("incline", "repeats") else 0
+    varied = plan["vary"].entries if plan["vary"] else ()
+    settings = prod(len(getattr(values, "items", "-")) for _, values in varied)
+    cases = settings * len(inclines)
+    runs = cases * plan["repeats"] if plan.is_sound("incline", "repeats") else 0
     if runs > MOST_RUNS:
         plan.fault("repeats", f"found {runs} runs; at most {MOST_RUNS} are accepted")
 

@@ -16,7 +16,7 @@ from rig.units import Quantity
 
 if TYPE_CHECKING:
     from rig.model.chain import Chain
-    from rig.protocol.protocol import Protocol, RodChain
+    from rig.protocol.protocol import Protocol, RodChain, Run
 
 
 def touching_heights(chain: RodChain, incline_deg: float) -> tuple[float, ...]:
@@ -83,6 +83,11 @@ def contact_level(protocol: Protocol, incline_deg: float, struck: str) -> Quanti
         return level
     top_rod = touching_heights(protocol.chains[struck], incline_deg)[-1]
     return Quantity(top_rod + level.value, level.u)
+
+
+def of_run(protocol: Protocol, run: Run) -> Protocol:
+    """Return the scene of a run with all heights relative to its contact point."""
+    return at_contact(protocol.of(run), run.incline_deg, run.impact)
 
 
 def at_contact(protocol: Protocol, incline_deg: float, struck: str | None) -> Protocol:

@@ -99,6 +99,8 @@ def _list_facts(protocol: Protocol) -> dict[str, Any]:
         "standard": protocol.gravity == standard,
         "runs": len(planned),
         "several": len(planned) > 1,
+        "settings": len(protocol.variants),
+        "settings_in_words": "; ".join(protocol.variants),
         "angles": ", ".join(f"{angle:g}" for angle in plan.inclines),
         "first": first,
         "share": sum(run.impact == first for run in planned),

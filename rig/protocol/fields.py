@@ -19,15 +19,17 @@ from rig.units import UnitError, parse, quote
 
 @dataclass(slots=True)
 class Faults:
-    """The problems noted so far in a file."""
+    """The problems noted so far in a file; `setting` of a plan's varied keys is told with each."""
 
     source: str
+    setting: str = ""
     problems: dict[tuple[int, int, str], Problem] = field(default_factory=dict)
 
     def add(self, place: Place, key: str, message: str) -> None:
         """Note a problem; a fault that chains inherit by `like` is noted once, at its place."""
         at = (place.line, place.column, message)
-        self.problems.setdefault(at, Problem(self.source, place.line, place.column, key, message))
+        told = f"{message} ({self.setting})" if self.setting else message
+        self.problems.setdefault(at, Problem(self.source, place.line, place.column, key, told))
 
 
 class UnsoundError(Exception):

@@ -27,6 +27,10 @@ def longest_fall(protocol: Protocol) -> float:
 
     This is the time of free fall √(2 h/g): an impact only makes a chain faster, as α > 0.
     """
+    return max(map(_longest_fall, protocol.settings.values()))
+
+
+def _longest_fall(protocol: Protocol) -> float:
     chains, gates, gravity = protocol.chains.values(), protocol.gates, protocol.gravity
     lowest = min((gate.height for gate in gates.gates), default=0.0)
     reach = max(
@@ -121,6 +125,10 @@ def passing_rods(protocol: Protocol, gate: Gate) -> dict[str, int]:
 
 def most_edges(protocol: Protocol) -> int:
     """Return the largest number of edges of a drop, over the chains that may hang on each side."""
+    return max(map(_most_edges, protocol.settings.values()))
+
+
+def _most_edges(protocol: Protocol) -> int:
     sides = map(protocol.gates.on, SIDES)
     passing = ([passing_rods(protocol, gate) for gate in gates] for gates in sides)
     most = (max(sum(rods[name] for rods in side) for name in protocol.chains) for side in passing)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TypeVar
 
 from rig.protocol.protocol import Order, Protocol, Run
@@ -16,11 +17,11 @@ PATTERNS: dict[Order, tuple[int, ...]] = {"ABBA": (0, 1, 1, 0), "alternate": (0,
 def runs(protocol: Protocol) -> tuple[Run, ...]:
     """Return all planned runs of a protocol.
 
-    Within each incline the impact chain of runs 1, 2, 3, 4 … is A, B, B, A … (``ABBA``),
+    At each incline and setting the impact chain of runs 1, 2, 3, 4 … is A, B, B, A … (``ABBA``),
     A, B, A, B … (``alternate``) or always A (``fixed``), A being the chain named first.
-    ``randomize: incline`` shuffles the order of the inclines and leaves each block whole;
-    ``randomize: all`` shuffles the runs themselves, so each chain keeps its number of impacts at
-    each incline.
+    ``randomize: incline`` shuffles inclines and settings together, and leaves each block whole;
+    ``randomize: all`` shuffles the runs themselves, so each chain keeps its number of impacts in
+    each case.
 
     Parameters
     ----------
@@ -30,17 +31,17 @@ def runs(protocol: Protocol) -> tuple[Run, ...]:
     Returns
     -------
     tuple of Run
-        ``len(inclines) × repeats`` runs, numbered from 1 in the order of execution. The same
-        protocol gives the same runs on every machine.
+        A run for each incline, setting and repeat, numbered from 1 in the order of execution. The
+        same protocol gives the same runs on every machine.
     """
     plan = protocol.plan
-    inclines = list(plan.inclines)
+    cases = list(product(plan.inclines, protocol.settings))
     if plan.randomize == "incline":
-        inclines = _shuffle(inclines, plan.seed)
+        cases = _shuffle(cases, plan.seed)
     pattern = PATTERNS[plan.order]
     drops = [
-        (incline, *_sides(protocol, pattern[repeat % len(pattern)]))
-        for incline in inclines
+        (incline, *_sides(protocol, pattern[repeat % len(pattern)]), setting)
+        for incline, setting in cases
         for repeat in range(plan.repeats)
     ]
     if plan.randomize == "all":

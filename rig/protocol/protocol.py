@@ -11,11 +11,12 @@ from math import cos, hypot, radians, sin
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from rig.protocol.fields import DEFAULTS
+from rig.protocol.variants import SCENE
 from rig.units import Quantity
 from rig.vocabulary import FENCE, FREE_CHAIN, OBJECT, ONE_CHAIN, TRACK, TWO_CHAINS, Vocabulary
 
 if TYPE_CHECKING:
-    from collections.abc import Collection, Iterable
+    from collections.abc import Collection, Iterable, Mapping
 
     from rig.model.chain import Chain
     from rig.model.surface import Surface
@@ -312,6 +313,8 @@ class Protocol:
     stated
         The original protocol with heights as in its file, if heights here are relative to a run's
         contact point: see `rig.protocol.contact`.
+    variants
+        The scene in each setting of the keys that the plan varies; empty if it varies none.
     """
 
     title: str
@@ -334,6 +337,7 @@ class Protocol:
     text: str = ""
     source: str = ""
     stated: Protocol | None = None
+    variants: Mapping[str, Protocol] = field(default_factory=dict)
 
     def __hash__(self) -> int:  # equality compares everything; this separates most protocols
         return hash((self.text, self.drop, self.gates))
@@ -392,9 +396,26 @@ class Protocol:
         """Return the protocol with other gates, whose heights are as uncertain."""
         return replace(self, gates=replace(self.gates, gates=tuple(gates)))
 
+    @property
+    def settings(self) -> Mapping[str, Protocol]:
+        """The scene in each setting, with the gates of this protocol; itself if there is one."""
+        return {
+            at: replace(self, variants={}, **{name: getattr(variant, name) for name in SCENE})
+            for at, variant in self.variants.items()
+        } or {"": self}
+
+    def of(self, run: Run) -> Protocol:
+        """Return the scene in the setting of a run."""
+        return self.settings.get(run.setting, self)
+
     def condition(self, run: Run) -> Condition:
-        """Return the condition of a run, for averages over runs."""
-        return Condition(run.incline_deg, run.impact if self.unlike_chains else None)
+        """Return the condition of a run, for averages over runs.
+
+        Without a surface the measurand is gravity, the same in all settings unless they change it.
+        """
+        gravity = {self.gravity, *(scene.gravity for scene in self.variants.values())}
+        setting = run.setting if self.surface is not None or len(gravity) > 1 else ""
+        return Condition(run.incline_deg, run.impact if self.unlike_chains else None, setting)
 
 
 class Condition(NamedTuple):
@@ -405,15 +426,16 @@ class Condition(NamedTuple):
 
     incline_deg: float
     impact_chain: str | None = None
+    setting: str = ""
 
     def __str__(self) -> str:
-        chain = "" if self.impact_chain is None else f", {self.impact_chain} strikes"
-        return f"{self.incline_deg:.15g} deg{chain}"
+        chain = "" if self.impact_chain is None else f"{self.impact_chain} strikes"
+        return ", ".join(filter(None, (f"{self.incline_deg:.15g} deg", chain, self.setting)))
 
     def json(self) -> dict[str, float | str]:
-        """Return ``incline_deg`` and, if there is one, ``impact_chain``."""
-        chain = {} if self.impact_chain is None else {"impact_chain": self.impact_chain}
-        return {"incline_deg": self.incline_deg, **chain}
+        """Return ``incline_deg`` and, if there are any, ``impact_chain`` and ``setting``."""
+        fields = self._asdict().items()
+        return {name: value for name, value in fields if value not in {None, ""}}
 
 
 @dataclass(frozen=True, slots=True)
@@ -430,9 +452,23 @@ class Run:
         Name of the chain on the impact side; `None` without a surface.
     free
         Name of the chain on the free side; `None` if only the impact chain falls.
+    setting
+        Values of the keys that the plan varies, in words; empty if it varies none.
     """
 
     number: int
     incline_deg: float
     impact: str | None
     free: str | None
+    setting: str = ""
+
+    @property
+    def kind(self) -> Run:
+        """The same for all runs that differ only in their number."""
+        return replace(self, number=0)
+
+    @property
+    def set_up(self) -> str:
+        """What is set before the drop, in words: the incline, and the keys that the plan varies."""
+        incline = "" if self.impact is None else f"{self.incline_deg:g}°"
+        return ", ".join(filter(None, (incline, self.setting)))

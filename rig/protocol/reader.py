@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,8 @@ from rig.protocol.checks import check_scene
 from rig.protocol.fields import Faults, Section, read_value
 from rig.protocol.keys import Plain
 from rig.protocol.site import gravity_at
-from rig.protocol.yamltree import load, place_at
+from rig.protocol.variants import vary
+from rig.protocol.yamltree import Node, load, place_at
 from rig.units import Quantity
 
 if TYPE_CHECKING:
@@ -91,14 +93,24 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> scene.P
     """
     if len(text) > MAX_BYTES:
         raise InputError(f"{source}: larger than {MAX_BYTES} bytes; a protocol is a text file")
-    faults = Faults(source)
-    top: Section | None = read_value(Plain.MAPPED, load(text, source), "", "", faults)
-    if top is None:
-        raise InputError(problems=faults.problems.values())
-    chains = read_chains(top)
-    check_scene(top, chains, kept=kept)
+    root, faults = load(text, source), Faults(source)
+    scenes = {at: _read_scene(root, text, faults, kept=kept) for at in vary(root, faults)}
     if faults.problems:
         raise InputError(problems=faults.problems.values())
+    variants = {at: scene for at, scene in scenes.items() if scene is not None}
+    first = next(iter(variants.values()))
+    return first if "" in variants else replace(first, variants=variants)
+
+
+def _read_scene(root: Node, text: str, faults: Faults, *, kept: bool) -> scene.Protocol | None:
+    """Return the protocol of a tree; `None` if it is faulty."""
+    top: Section | None = read_value(Plain.MAPPED, root, "", "", faults)
+    if top is None:
+        return None
+    chains, source = read_chains(top), faults.source
+    check_scene(top, chains, kept=kept)
+    if faults.problems:
+        return None
     track = top["track"] and scene.InclinedTrack(**_arguments(top["track"], incline="incline_deg"))
     site, contact = top["site"], top["contact"]
     gravity = gravity_at(site["latitude"], site["height"]) if site else top["gravity"]
@@ -111,7 +123,7 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> scene.P
         track=track,
         gates=_gates(top["gates"]) if top["gates"] else scene.Gates(),
         release=scene.ReleasePulse(**_arguments(top["release"])),
-        plan=scene.Plan(**_arguments(top["plan"], incline="inclines")),
+        plan=scene.Plan(**_arguments(top["plan"], "vary", incline="inclines")),
         accept=scene.Accept(**_arguments(top["accept"])),
         initial_speed=top["initial_speed"],
         drag=top["drag"] and scene.Drag(**_arguments(top["drag"])),
@@ -127,10 +139,10 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> scene.P
     )
 
 
-def _arguments(section: Section | None, **names: str) -> dict[str, Any]:
-    """Return the values of a section by name; `names` maps keys to attribute names."""
-    values = section.values if section else {}
-    return {names.get(name, name): value for name, value in values.items()}
+def _arguments(section: Section | None, *without: str, **names: str) -> dict[str, Any]:
+    """Return the other values of a section by name; `names` maps keys to attribute names."""
+    values = section.values.items() if section else ()
+    return {names.get(name, name): value for name, value in values if name not in without}
 
 
 def _surface(section: Section) -> Surface:

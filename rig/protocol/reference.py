@@ -35,6 +35,8 @@ def _object(path: str, description: str) -> dict[str, Any]:
     """Return the schema of the mapping at a path."""
     head: dict[str, Any] = {"type": "object"}
     head |= {"description": description} if description else {}
+    if path == "plan.vary":
+        return head | {"additionalProperties": {"type": "array", "minItems": 1}}
     if path not in keys.SECTIONS:
         inner = _object(f"{path}.{keys.ANY}", "a chain")
         return head | {"additionalProperties": inner, "minProperties": 1, "maxProperties": 2}

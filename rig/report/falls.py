@@ -18,7 +18,7 @@ from rig.analysis.result import GOOD, DropResult
 from rig.arrays import Array
 from rig.estimate.curves import model_fall
 from rig.measurands import FALL_TIME, RELEASE_SKEW, SEPARATION, SPEED, acceleration_in
-from rig.protocol.contact import at_contact
+from rig.protocol.contact import of_run
 from rig.protocol.protocol import Protocol, Side
 from rig.records import Drop
 from rig.report.figure import Chart, chart
@@ -89,7 +89,7 @@ def fall_figures(
 ) -> Iterator[Chart]:
     """Yield the figures of a good drop: its fall first, then those of the impacts."""
     run, values, head = result.run, result.quantities, f"Run {result.run.number}"
-    protocol = at_contact(protocol, run.incline_deg, run.impact)
+    protocol = of_run(protocol, run)
     if result.verdict not in GOOD:
         return
     struck, free = (passages(protocol, drop, hz, result, side) for side in ("impact", "free"))
@@ -99,7 +99,7 @@ def fall_figures(
         return
     if struck.time.size < 3 or not {FALL_TIME.name, SPEED.name} <= values.keys():
         return
-    head += f" at {run.incline_deg:g}°"
+    head += f" at {run.set_up}"
     end = values[FALL_TIME.name].value
     released = struck.time[-1] + struck.height[-1] / values[SPEED.name].value - end
     time = struck.time - released

@@ -39,7 +39,7 @@ def result_figure(
     bars: Bars = "U95",
     site_m_s2: float | None = None,
 ) -> Chart | None:
-    """Return the figure of results against incline, or by run for a single incline.
+    """Return the figure of results against incline, or by run for few inclines or other settings.
 
     Parameters
     ----------
@@ -57,7 +57,8 @@ def result_figure(
         return None
     title = " and ".join(f"{row.title} {row.symbol}" for row in rows)
     inclines = {run.run.incline_deg for run in analysis.runs}
-    if len(inclines) < FEWEST_INCLINES or acceleration_in(measured):
+    varied = any(run.run.setting for run in analysis.runs)
+    if len(inclines) < FEWEST_INCLINES or varied or acceleration_in(measured):
         return chart("runs", *(_by_run(analysis, row, site_m_s2) for row in rows), title=title)
     gaps = _model_gaps(curves)
     sources = (
@@ -184,7 +185,8 @@ def _by_run(analysis: Analysis, row: Measurand, site_m_s2: float | None) -> dict
     means = means_of(analysis.summary, row)
     expected = [site_m_s2] if acceleration_in([row.name]) else []
     expected += [value_of(mean.line.predicted.get(row.name)) for mean in means]
-    stated = [value for value in expected if value is not None][:1]
+    stated = [*{value for value in expected if value is not None}]
+    stated *= len(stated) == 1
     return {
         "row": row,
         "means": [
@@ -207,8 +209,8 @@ def _runs_by_chain(
     """Return a quantity of all runs, a series for each striking chain; crosses for void runs."""
     points = defaultdict[str, list[Any]](list)
     for run in sorted(analysis.runs, key=attrgetter("run.number")):
-        like = Condition(run.run.incline_deg)  # for like chains
-        own = like._replace(impact_chain=run.run.impact)
+        own = Condition(run.run.incline_deg, run.run.impact, run.run.setting)
+        like = own._replace(impact_chain=None)  # for like chains
         reference = references.get(own, references.get(like)) if references is not None else 0.0
         value = run.quantities.get(row.name)
         if value is not None and reference is not None:

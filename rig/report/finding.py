@@ -88,8 +88,8 @@ def _reference(row: Measurand) -> str:
 
 
 def _place(line: Incline) -> str:
-    striker = f", {line.impact_chain} strikes" if line.impact_chain else ""
-    return f"{summary_incline(line)}°{striker}"
+    striker = line.condition.impact_chain and f"{line.condition.impact_chain} strikes"
+    return ", ".join(filter(None, (f"{summary_incline(line)}°", striker, line.condition.setting)))
 
 
 def remarks(results: SessionResults) -> list[str]:

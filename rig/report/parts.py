@@ -77,7 +77,7 @@ def means_of(summary: Sequence[Incline], *rows: Measurand) -> list[Mean]:
 
 def summary_incline(line: Incline) -> str:
     """Return the inclination of a mean as text; empty without a surface."""
-    return "" if acceleration_in(line.means) else degrees(line.incline_deg)
+    return "" if acceleration_in(line.means) else degrees(line.condition.incline_deg)
 
 
 def means_parts(summary: Sequence[Incline]) -> list[Part]:

@@ -13,6 +13,7 @@ from typing import Any
 
 from rig.analysis.averages import by_case, combine
 from rig.analysis.components import priors
+from rig.analysis.owners import statements
 from rig.analysis.plain_data import Record, attributes, plain
 from rig.analysis.result import GOOD, DropResult, Measured, good_runs
 from rig.analysis.session import Analysis, Progress, SessionDrops, fit_sessions
@@ -158,7 +159,7 @@ class TogetherResults:
         differences = []
         for part in rest:
             for condition, runs in part.cases.items():
-                alike = [key for key in first.cases if key.incline_deg == condition.incline_deg]
+                alike = [key for key in first.cases if key[::2] == condition[::2]]
                 same = [key for key in alike if key.impact_chain == condition.impact_chain] or alike
                 pair = runs, first.cases[same[0]] if len(same) == 1 else []
                 for row in averaged() if pair[1] else ():
@@ -243,24 +244,9 @@ def same_owners(parts: Sequence[SessionPart], *, same_rig: bool | None) -> Share
     for place, part in enumerate(parts):
         by_name = (part.protocol.title, part.board)
         rig: object = by_name if same_rig is None else same_rig or place
-        for owner, statement in _statements(part.protocol).items():
+        for owner, statement in statements(part.protocol).items():
             owners.setdefault(owner, {}).setdefault((rig, repr(statement)), []).append(part.name)
     return {owner: list(groups.values()) for owner, groups in owners.items()}
-
-
-def _statements(protocol: Protocol) -> dict[str, object]:
-    """Return a protocol's statements about the owner of each shared unknown."""
-    gates, chains = protocol.gates, protocol.chains
-    beams = [(gate.channel, gate.height, gate.side) for gate in gates.gates]
-    scene = (chains, protocol.surface, protocol.contact, protocol.drop)
-    return {
-        "rig": (protocol.gravity, protocol.drag, protocol.track, protocol.reference_u),
-        "posts": (gates.posts, gates.datum_u),
-        "beams": (beams, gates.height_u),
-        "start": protocol.drop,
-        "condition": scene,
-        **{f"chain {name}": chain for name, chain in chains.items()},
-    }
 
 
 def _list(key: str, groups: Iterable[tuple[Any, Iterable[Any]]]) -> list[dict[str, Any]]:
@@ -276,10 +262,11 @@ def _with_owners(part: SessionPart, shared: Shared, count: int) -> SessionDrops:
         for group in groups
         if part.name in group
     }
-    fits = {
-        job: replace(fit, model=fit.model.copy_with(owners=owners))
-        for job, fit in part.analysis.adjusted.items()
-    }
+    fits = {}
+    for job, fit in part.analysis.adjusted.items():
+        settings = fit.model.owners
+        own = {owner: suffix + settings.get(owner, "") for owner, suffix in owners.items()}
+        fits[job] = replace(fit, model=fit.model.copy_with(owners=own))
     return SessionDrops(part.protocol, part.analysis.drops, fits)
 
 
@@ -289,7 +276,8 @@ def _pool_means(parts: Sequence[SessionPart]) -> dict[tuple[str, ...], tuple[Inc
     for part in parts:
         own = part.protocol
         scene = (own.chains, own.surface, own.contact, own.drop, own.gravity, own.drag)
-        scenes.setdefault(repr((*scene, own.track, own.initial_speed)), []).append(part)
+        more = own.track, own.initial_speed, own.variants
+        scenes.setdefault(repr((*scene, *more)), []).append(part)
     return {
         tuple(part.name for part in alike): summarize(
             alike[0].protocol, [run for part in alike for run in part.analysis.runs]

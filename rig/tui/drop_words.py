@@ -36,10 +36,9 @@ _PAST = 6
 def headline(run: Run, total: int, attempt: int) -> str:
     """Return the headline of a run: number, attempt, incline and striking chain."""
     again = f" · attempt {attempt}" if attempt > 1 else ""
-    if run.impact is None:
-        return f"Run {run.number} of {total}{again}"
-    strikes = f"{run.incline_deg:g}° · chain {one_line(run.impact, 20)} strikes"
-    return f"Run {run.number} of {total}{again} · {strikes}"
+    strikes = f"chain {one_line(run.impact, 20)} strikes" if run.impact else ""
+    head = f"Run {run.number} of {total}{again}"
+    return " · ".join(filter(None, (head, one_line(run.set_up, 40), strikes)))
 
 
 def expected_words(protocol: Protocol, run: Run) -> str:

@@ -13,7 +13,7 @@ from rig.analysis.trajectory import Trajectory
 from rig.arrays import Array
 from rig.errors import DomainError
 from rig.estimate.curves import model_fall
-from rig.protocol.contact import at_contact
+from rig.protocol.contact import of_run
 from rig.protocol.protocol import Protocol, RodChain, Run, Side
 from rig.records import Drop
 from rig.report.falls import passages
@@ -96,7 +96,7 @@ def motions(
         The drop, calibrated ticks per second, and its result; `None` before the drop, for the
         model's curves alone.
     """
-    protocol = at_contact(protocol, run.incline_deg, run.impact)
+    protocol = of_run(protocol, run)
     sides: tuple[tuple[Side, str | None], ...] = (("impact", run.impact), ("free", run.free))
     falls = []
     for role, name in sides:

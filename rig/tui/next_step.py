@@ -96,7 +96,7 @@ def _prepare(model: Model) -> NextStep:
     body = model.words.body
     if run is not None and run.impact is not None:
         beside = f" on the impact side, {plain(run.free, 20)} on the free side" * bool(run.free)
-        body = f"{plain(run.impact, 20)}{beside}, board at {run.incline_deg:g}°"
+        body = f"{plain(run.impact, 20)}{beside}, board at {plain(run.set_up, 40)}"
     settle = duration(model.settle_s)
     return NextStep(
         "arm",

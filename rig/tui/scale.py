@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.protocol.contact import at_contact
+from rig.protocol.contact import of_run
 from rig.tui.braille import COLUMNS, ROWS, Sheet, Span
 
 if TYPE_CHECKING:
@@ -80,7 +80,7 @@ def drawing(
     time_s
         Time since the release fired, s.
     """
-    protocol = at_contact(protocol, run.incline_deg, run.impact)
+    protocol = of_run(protocol, run)
     strokes: list[Stroke] = []
     lamps: list[Lamp] = []
     pitch = 2.4 * max((_rod_m(fall.rods) for fall in falls), default=_WIDTH_M)

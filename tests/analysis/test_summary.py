@@ -103,13 +103,16 @@ def test_inclines_come_in_order_and_only_good_runs_count():
     for bad in ("void", "rejected"):
         drops += results(UNIFORM, {60.0: [0.5], 40.0: [0.5]}, bad)
     first, second = summarize(UNIFORM, drops)
-    assert (first.incline_deg, first.n, second.incline_deg, second.n) == (40.0, 3, 80.0, 1)
+    assert [(line.condition.incline_deg, line.n) for line in (first, second)] == [
+        (40.0, 3),
+        (80.0, 1),
+    ]
     assert first.means["separation_m"].value == pytest.approx(0.115)
     assert first.deviations["separation_m"] == pytest.approx(math.sqrt(7e-6), rel=1e-9)
     assert first.deviations["speed_m_s"] == pytest.approx(50 * math.sqrt(7e-6), rel=1e-9)
     assert second.deviations == {}
     for line in (first, second):
-        separation, speed = REFERENCE[line.incline_deg]
+        separation, speed = REFERENCE[line.condition.incline_deg]
         assert line.predicted["separation_m"].value == pytest.approx(separation, rel=1e-12)
         assert line.predicted["speed_m_s"].value == pytest.approx(speed, rel=1e-8)
     # At 40°: 3.5 mm for β ± 0.05, 4.6 mm for μ ± 0.05 (here 0.02), 0.3 mm for 10 mm (here 2 mm).
@@ -146,7 +149,9 @@ def test_top_rods_of_unlike_chains_start_apart():
     # Together they stay two results: one mean of both would be of nothing that fell.
     lines = summarize(protocol, drops)
     assert [line.json()["impact_chain"] for line in lines] == ["A", "B"]
-    assert {line.impact_chain: line.predicted["separation_m"].value for line in lines} == by_chain
+    assert {
+        line.condition.impact_chain: line.predicted["separation_m"].value for line in lines
+    } == by_chain
 
 
 def test_like_chains_make_one_result():

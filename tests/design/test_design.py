@@ -16,7 +16,7 @@ from rig.estimate.coefficients import best, coefficient_problem
 from rig.estimate.hypotheses import model_alpha
 from rig.estimate.quadratic_forms import merge_like
 from rig.protocol import reader
-from rig.protocol.protocol import Gate, Gates, Plan, Priors, Protocol
+from rig.protocol.protocol import Condition, Gate, Gates, Plan, Priors, Protocol
 from rig.protocol.reader import parse
 from rig.ready import find_protocol
 from rig.vocabulary import OBJECT, TWO_CHAINS
@@ -65,8 +65,8 @@ def test_the_forecast_is_what_a_session_then_states(expected):
     """Same scatter, same plan: only edges that were missed are in one and not in the other."""
     for result in analysis(INCLINES).runs:
         for name, by_case in expected.single.items():
-            stated = result.quantities[name].u
-            assert by_case[result.run.incline_deg, None] == pytest.approx(stated, rel=0.1), name
+            case, stated = Condition(result.run.incline_deg), result.quantities[name].u
+            assert by_case[case] == pytest.approx(stated, rel=0.1), name
 
 
 def test_the_forecast_of_coefficients_is_what_the_estimate_then_states(expected):
@@ -83,7 +83,7 @@ def test_more_runs_tell_more_but_not_of_what_is_common():
     for name in ("restitution", "friction"):
         assert many.coefficients[name] < 0.5 * one.coefficients[name]
     for incline in INCLINES:
-        at = incline, None
+        at = Condition(incline)
         assert many.mean["speed_m_s"][at] < 0.5 * one.mean["speed_m_s"][at]
         assert many.mean["separation_m"][at] < one.mean["separation_m"][at]
         # Beam heights are off by as much in every run.

@@ -8,7 +8,7 @@ from rig.analysis.result import Audit, DropResult, Measured
 from rig.analysis.session import Analysis
 from rig.analysis.summary import Incline, summarize
 from rig.predictions import predictions
-from rig.protocol.protocol import Run
+from rig.protocol.protocol import Condition, Run
 from rig.units import Quantity
 from tests.sim.falls import UNIFORM
 
@@ -93,5 +93,5 @@ def gravity(seed: int = 3) -> Analysis:
         for number in range(1, 11)
     ]
     mean, model = Measured(9.8188, 0.0014), Quantity(9.8201)
-    line = Incline(0.0, 10, {"gravity_m_s2": mean}, {}, {"gravity_m_s2": model})
+    line = Incline(Condition(0.0), 10, {"gravity_m_s2": mean}, {}, {"gravity_m_s2": model})
     return analysis(runs, [compared(line)])

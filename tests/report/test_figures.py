@@ -197,7 +197,7 @@ def test_a_figure_its_numbers_and_its_caption(number, own, other, tmp_path):
 
 
 def test_shares_of_a_variance_add_up_to_the_whole():
-    (line,) = [line for line in TWO.summary if line.incline_deg == 40.0]
+    (line,) = [line for line in TWO.summary if line.condition.incline_deg == 40.0]
     mean = Measured(0.1, 5e-3, budget={"runs": 3e-3, "common": 4e-3})
     line = replace(line, means={"separation_m": mean}, causes={"separation_m": {"datum": 4e-3}})
     assert variance_shares([line], SEPARATION) == pytest.approx({"runs": 36.0, "datum": 64.0})

@@ -16,7 +16,7 @@ import yaml
 
 from rig import __version__
 from rig.analysis.result import GOOD, Audit, DropResult
-from rig.protocol.protocol import Run
+from rig.protocol.protocol import Condition, Run
 from rig.records import Job
 from rig.report.attachments import METHOD, Attachment, method_page
 from rig.report.columns import Part
@@ -72,7 +72,7 @@ def page_with(text: str) -> dict[str, Any]:
     )  # fmt: skip
     analysis = Simple(
         runs=(result,), drops=[result], superseded=(), damage=[text],
-        summary=(Simple(incline_deg=1.0, gates=(), means={}),),
+        summary=(Simple(condition=Condition(1.0), gates=(), means={}),),
         rig=Simple(likeness=Simple(sentence=text), drag=None),
     )  # fmt: skip
     outcome = Mock(blind=False, analysis=analysis, clock=Simple(details={text: text}))

@@ -15,6 +15,7 @@ from rig.analysis.result import Measured
 from rig.analysis.session import analyze
 from rig.analysis.summary import Incline
 from rig.clock.calibration import TimeScale
+from rig.protocol.protocol import Condition
 from rig.reasons import make_reason, plain_reason
 from rig.records import Job
 from rig.results.blind import veiled_drop
@@ -157,7 +158,8 @@ def test_what_is_measured_better_brings_at_least_what_was_promised():
 
 def test_a_better_input_leaves_the_other_lines_and_their_degrees_of_freedom():
     mean = Measured(6.0, 5e-3, 100.0, {"runs": 3e-3, "common": 4e-3})
-    line = Incline(40.0, 4, {"speed_m_s": mean}, {}, {}, causes={"speed_m_s": {"datum": 4e-3}})
+    causes = {"speed_m_s": {"datum": 4e-3}}
+    line = Incline(Condition(40.0), 4, {"speed_m_s": mean}, {}, {}, causes=causes)
     (better,) = improvements([line])
     rest = 9e-6 + 16e-6 / better.times_better**2
     degrees = 100.0 * (rest / 25e-6) ** 2

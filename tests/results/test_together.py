@@ -108,7 +108,7 @@ def test_another_scene_is_refused_and_what_has_no_incline_in_common(two, tmp_pat
     refused("sessions_unlike", InputError, first, two[0])
     found = together(first, other)
     refused("nothing_to_compare", InputError, work=found.differences)
-    assert [line.incline_deg for line in found.summary] == [40.0, 50.0]
+    assert [line.condition.incline_deg for line in found.summary] == [40.0, 50.0]
 
 
 def test_a_session_and_its_copy_are_one(two, tmp_path):

@@ -84,8 +84,8 @@ def test_keys_fit_their_line(width):
     )
 
 
-RUN = {"run": 1, "incline_deg": 40, "impact": "A", "free": "B", "attempt": 0, "state": "planned",
-       "reasons": [], "reason_codes": []}  # fmt: skip
+RUN = {"run": 1, "incline_deg": 40, "impact": "A", "free": "B", "setting": "",
+       "attempt": 0, "state": "planned", "reasons": [], "reason_codes": []}  # fmt: skip
 STATE = {
     "phase": "idle", "link": {"state": "up", "error": None, "retry_s": None},
     "port": {"url": "sim://", "simulated": True}, "gates": {"blocked": 5, "age_s": 0.0},

@@ -166,7 +166,7 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
 def _which(view: SessionView, job: Job, player: Player, reasons: Sequence[Reason]) -> list[Content]:
     """Return the name of the replayed drop, and the state of the replay."""
     verdict, run = view.results[job].verdict, view.plan[job.run]
-    what = f"{run.incline_deg:g}° impact {run.impact}" if run.impact else run.free
+    what = f"{run.set_up} {f'impact {run.impact}' if run.impact else run.free}".strip()
     state = "▶ playing" if player.playing else "‖ paused"
     return [
         Content.assemble(
