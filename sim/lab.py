@@ -336,7 +336,7 @@ class ChainLab:
 
     def _contact(self, run: Run) -> float:
         """How far above the contact level rods touch, m."""
-        draw = self._rng("contact", *self.protocol.condition(run)).normal()
+        draw = self._rng("contact", *self.protocol.condition(run)[:2]).normal()
         return self.dials.contact_sd * float(draw)
 
     def _shift(self, body: Body, gate: Gate) -> np.ndarray:

@@ -18,10 +18,10 @@ import numpy as np
 
 from rig.analysis.averages import by_case
 from rig.analysis.distributions import chi2_tail, coverage_factor
-from rig.analysis.plain_data import Record
 from rig.analysis.result import Deviation, DropResult, Measured
 from rig.arrays import Array
 from rig.measurands import averaged
+from rig.plain_data import Record
 from rig.predictions import coefficient_slopes, predicted_run
 from rig.protocol.protocol import GUESSED, Condition, Protocol
 from rig.units import Quantity

@@ -18,9 +18,9 @@ from rig.analysis.annealing import MISSED, STRAYS
 from rig.analysis.chain_records import QUICK, WIDER, ChainRecord, EdgeTrain
 from rig.analysis.fit import Fit
 from rig.analysis.joint_step import JointDrop
-from rig.analysis.plain_data import attributes
 from rig.analysis.trajectory import Trajectory
 from rig.arrays import Array, Flags, Index
+from rig.plain_data import attributes
 
 EdgeClass = Literal[
     "missed",

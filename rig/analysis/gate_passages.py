@@ -9,9 +9,9 @@ import numpy as np
 
 from rig.analysis.dual import Dual
 from rig.analysis.fit import DropFit
-from rig.analysis.plain_data import Record
 from rig.analysis.quantities import AdjustedDrop
 from rig.analysis.result import Measured
+from rig.plain_data import Record
 from rig.protocol.protocol import Gate
 
 

@@ -17,11 +17,11 @@ import numpy as np
 from rig.analysis.averages import mean
 from rig.analysis.evidence import STATED_WEIGHT
 from rig.analysis.fit import Fit, count_matched
-from rig.analysis.plain_data import Record
 from rig.analysis.result import DropResult, Measured, good_runs
 from rig.analysis.square_root import square_root
 from rig.analysis.unknowns import ANY_GRAVITY
 from rig.measurands import GRAVITY
+from rig.plain_data import Record
 from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, make_reason
 from rig.units import Quantity

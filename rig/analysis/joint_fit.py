@@ -22,11 +22,11 @@ from rig.analysis.evidence import Evidence
 from rig.analysis.fit import DropFit, Fit
 from rig.analysis.joint_step import DropGroup, JointDrop, group_drops, joint_step, with_priors
 from rig.analysis.likeness import Likeness, likeness
-from rig.analysis.plain_data import Record, attributes
 from rig.analysis.result import Measured
 from rig.analysis.square_root import Elimination
 from rig.analysis.unknowns import SharedUnknowns
 from rig.arrays import Array
+from rig.plain_data import Record, attributes
 from rig.protocol.protocol import GUESSED
 from rig.threads import one_thread
 

@@ -6,7 +6,7 @@ import math
 from statistics import median
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rig.analysis.plain_data import attributes
+from rig.plain_data import attributes
 
 if TYPE_CHECKING:
     from rig.analysis.joint_fit import JointFit

@@ -16,10 +16,10 @@ from operator import attrgetter
 import numpy as np
 
 from rig.analysis.averages import combine
-from rig.analysis.plain_data import Record
 from rig.analysis.result import DropResult, Measured, good_runs
 from rig.arrays import Array
 from rig.measurands import MEASURANDS
+from rig.plain_data import Record
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Protocol
 

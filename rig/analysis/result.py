@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rig.analysis.distributions import coverage_factor
-from rig.analysis.plain_data import Record, spread
+from rig.plain_data import Record, spread
 from rig.reasons import Reason, reasons_json, rig_error
 from rig.records import Job
 

@@ -17,12 +17,12 @@ from rig.analysis.fit import DropFit, Fit, alone
 from rig.analysis.joint_fit import FEWEST, JointFit, RigEstimate, joint_fit
 from rig.analysis.joint_step import JointDrop
 from rig.analysis.pairs import Effects, effects
-from rig.analysis.plain_data import Record
 from rig.analysis.processes import do_in_order
 from rig.analysis.result import GOOD, DropResult
 from rig.analysis.summary import Incline, summarize
 from rig.analysis.verdict import nearly_in_time, release_reasons, verdict_of
 from rig.clock.calibration import TimeScale
+from rig.plain_data import Record
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Protocol, Run

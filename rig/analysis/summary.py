@@ -12,9 +12,9 @@ from rig.analysis.averages import by_case, mean
 from rig.analysis.budget_lines import COMMON
 from rig.analysis.comparison import Comparison, Difference, compare
 from rig.analysis.gate_passages import GatePassage
-from rig.analysis.plain_data import Record, attributes, spread
 from rig.analysis.result import DropResult, Measured, good_runs
 from rig.measurands import MEASURANDS, averaged
+from rig.plain_data import Record, attributes, spread
 from rig.predictions import predicted_run
 from rig.protocol.protocol import Condition, Protocol
 from rig.units import Quantity

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rig.analysis.plain_data import Record
 from rig.analysis.result import Measured
 from rig.arrays import Array
+from rig.plain_data import Record
 
 _BENT = 0.5
 """Correlation of neighbouring residuals above which frames do not follow a parabola."""

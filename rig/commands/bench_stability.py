@@ -6,11 +6,11 @@ from collections.abc import Iterable, Iterator
 from itertools import groupby
 from pathlib import Path
 
-from rig.analysis.plain_data import plain
 from rig.bench.figures import conditioning_figure
 from rig.bench.findings import Findings
 from rig.bench.stability import VERDICTS, StabilityRow, stability
 from rig.bench.work import EPSILON
+from rig.plain_data import plain
 from rig.text_table import text_table
 
 _HEAD = Path(__file__).with_suffix(".md").read_text("utf-8").rstrip()

@@ -6,12 +6,12 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Measured
 from rig.estimate.coefficients import CoefficientProblem
 from rig.estimate.hypotheses import by_model, one_alpha, with_nuisances
 from rig.estimate.hypothesis_fit import Hypothesis, HypothesisFit, LikelihoodRatio, fit
 from rig.estimate.quadratic_forms import QuadraticForm
+from rig.plain_data import attributes, plain
 from rig.protocol.protocol import Condition, Protocol, Run
 
 

@@ -12,13 +12,13 @@ from rig.analysis.dual import Dual
 from rig.analysis.fit import Fit
 from rig.analysis.joint_fit import JointFit, by_itself
 from rig.analysis.joint_step import JointDrop
-from rig.analysis.plain_data import attributes
 from rig.analysis.quantities import AdjustedDrop
 from rig.analysis.trajectory import Trajectory, free_trajectory, struck_trajectory
 from rig.arrays import Array
 from rig.measurands import SEPARATION
 from rig.model.fall import kicks
 from rig.model.impact import impact_on
+from rig.plain_data import attributes
 from rig.predictions import air_of
 from rig.protocol.contact import higher_contacts, of_run
 from rig.protocol.protocol import Protocol, Run, Side

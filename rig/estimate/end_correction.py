@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from rig.analysis.distributions import chi2_tail
-from rig.analysis.plain_data import attributes
 from rig.analysis.result import Measured
 from rig.estimate.coefficients import CoefficientProblem
 from rig.estimate.hypotheses import END, one_alpha, with_end_correction, with_nuisances
 from rig.estimate.hypothesis_fit import fit
 from rig.model.impact import impact_on
+from rig.plain_data import attributes
 from rig.protocol.protocol import Protocol
 from rig.reasons import make_reason
 

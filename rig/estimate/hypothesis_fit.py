@@ -11,12 +11,12 @@ import numpy as np
 from rig.analysis.adjust import least_squares
 from rig.analysis.distributions import chi2_tail
 from rig.analysis.equations import Linearization, standardise
-from rig.analysis.plain_data import attributes
 from rig.analysis.result import Measured
 from rig.analysis.square_root import EquationRows
 from rig.arrays import Array
 from rig.errors import RigError
 from rig.estimate.quadratic_forms import EXTRA, QuadraticForm
+from rig.plain_data import attributes
 
 ANYTHING = 1.0
 """How far a parameter may be from where the search begins when nothing is known of it: coefficients

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rig.analysis.averages import by_case
-from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import Measured
 from rig.arrays import Array
 from rig.estimate.hypotheses import one_alpha, open_alphas, with_nuisances
 from rig.estimate.hypothesis_fit import LikelihoodRatio, fit
 from rig.estimate.quadratic_forms import QuadraticForm
+from rig.plain_data import attributes, plain
 from rig.protocol.protocol import Condition, Protocol
 from rig.reasons import make_reason
 

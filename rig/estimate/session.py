@@ -10,7 +10,6 @@ import numpy as np
 
 from rig.analysis.averages import by_case
 from rig.analysis.comparison import Comparison, compare
-from rig.analysis.plain_data import attributes, plain
 from rig.analysis.result import GOOD, Measured, good_runs
 from rig.analysis.session import Analysis
 from rig.analysis.unknowns import SharedUnknowns, prior_air
@@ -25,6 +24,7 @@ from rig.estimate.hypothesis_fit import HypothesisFit
 from rig.estimate.posterior import Posterior, posterior
 from rig.estimate.quadratic_forms import merge_like, quadratic_form
 from rig.estimate.rods import Impulses, impulses, resolution
+from rig.plain_data import attributes, plain
 from rig.protocol.protocol import Protocol
 from rig.reasons import make_reason, rig_error
 from rig.sections import Sections

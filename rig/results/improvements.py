@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from statistics import fmean
 
 from rig.analysis.budget_lines import BUDGET
-from rig.analysis.plain_data import Record
 from rig.analysis.summary import Incline
 from rig.measurands import Measurand, averaged
+from rig.plain_data import Record
 
 _BETTER = 10.0
 """Assumed improvement of an input's uncertainty, a factor."""

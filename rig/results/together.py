@@ -14,11 +14,11 @@ from typing import Any
 from rig.analysis.averages import by_case, combine
 from rig.analysis.components import priors
 from rig.analysis.owners import statements
-from rig.analysis.plain_data import Record, attributes, plain
 from rig.analysis.result import GOOD, DropResult, Measured, good_runs
 from rig.analysis.session import Analysis, Progress, SessionDrops, fit_sessions
 from rig.analysis.summary import Incline, summarize
 from rig.measurands import averaged
+from rig.plain_data import Record, attributes, plain
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Condition, Protocol
 from rig.reasons import rig_error

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from rig.analysis.gravity import GravityCheck, check_gravity
-from rig.analysis.plain_data import attributes, plain
 from rig.analysis.session import Analysis, Progress, analyze
 from rig.analysis.summary import Incline
 from rig.cache.entry import CacheEntry
 from rig.clock.calibration import Calibration, Calibrator, TimeScale
+from rig.plain_data import attributes, plain
 from rig.protocol import reader
 from rig.protocol.measurable import with_channels
 from rig.protocol.protocol import Protocol

@@ -1,4 +1,4 @@
-"""Sessions whose plan varies a key of the scene: one rig, one joint fit, a line for each setting."""
+"""Sessions whose plan varies a key of the scene: one rig, one fit, a line for each setting."""
 
 import json
 
@@ -68,7 +68,8 @@ def test_pages_tables_and_coefficients_tell_the_settings_apart(chains, call, tmp
     call("export", str(chains), "--csv", str(tmp_path / "csv"))
     assert "drop 180 mm" in (tmp_path / "csv" / "runs.csv").read_text("utf-8")
     found = json.loads(call("estimate", str(chains), "--json").out)
-    assert [line["setting"] for line in found["alpha"]["inclines"]] == ["drop 180 mm", "drop 228.5 mm"]
+    settings = [line["setting"] for line in found["alpha"]["inclines"]]
+    assert settings == ["drop 180 mm", "drop 228.5 mm"]
     call("replay", str(chains))
 
 

@@ -43,7 +43,7 @@ def test_what_runs_cannot_vary_is_refused_at_its_place(words, start):
 
 def test_what_only_another_setting_has_wrong_is_told_with_it():
     problems = refused(InputError, "", vary, "{drop: [180 mm, 26 mm]}").problems
-    assert [problem.key for problem in problems] == ["gates.impact[0].height", "gates.free[0].height"]
+    assert [problem.line for problem in problems] == [10, 11]
     for problem in problems:
         assert "rod 1 of A blocks before the release" in problem.message
         assert problem.message.endswith("(drop 26 mm)")
