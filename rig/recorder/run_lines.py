@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import astuple
 from typing import Any, NamedTuple
 
 from rig.protocol.protocol import Run
@@ -44,6 +43,8 @@ def plan_lines(planned: Iterable[Run], log: Iterable[StateEntry]) -> list[RunLin
     """Say where each planned run stands by the log of a session."""
     last = {entry.run: (entry.attempt, entry.state, entry.reasons) for entry in log}
     return [
-        RunLine(*astuple(run)[:4], *last.get(run.number, ()), setting=run.setting)
+        RunLine(
+            run.number, run.incline_deg, run.impact, run.free, *last.get(run.number, ())
+        )._replace(setting=run.setting)
         for run in planned
     ]
