@@ -120,7 +120,7 @@ def read_bundle(path: str | os.PathLike[str]) -> tuple[dict[str, bytes], list[st
     place = Path(path)
     if place.is_dir():
         folder = place if (place / SUMS).exists() else place / ROOT
-        paths = [each for each in sorted(folder.rglob("*")) if each.is_file()]
+        paths = filter(Path.is_file, sorted(folder.rglob("*")))
         files = {each.relative_to(folder).as_posix(): _read(each) for each in paths}
     else:
         data = _read(place)
@@ -150,12 +150,13 @@ def _members(place: Path, data: bytes) -> dict[str, bytes]:
     for member in members:
         name, size = member.filename, member.compress_size
         begin = member.header_offset + _LOCAL_HEADER + len(name.encode())
-        is_stored = member.compress_type == zipfile.ZIP_STORED
-        if not (is_stored and name.startswith(ROOT) and ".." not in name.split("/")):
+        is_inside = name.startswith(ROOT) and ".." not in name.split("/")
+        if member.compress_type != zipfile.ZIP_STORED or not is_inside:
             raise _foreign(place, f"{name!r:.60} is compressed, or outside of {ROOT}")
         files[name.removeprefix(ROOT)] = data[begin : begin + size]
-    if sum(map(len, files.values())) > len(data):
-        raise _foreign(place, "its members overlap")
+    # Read as if bytes stood before all files, or some of them twice.
+    if sum(map(len, files.values())) > len(data) or any(m.header_offset for m in members[:1]):
+        raise _foreign(place, "its directory was altered")
     return files
 
 

@@ -106,7 +106,7 @@ def _check_session(path: str, key: str | None) -> Iterator[str]:
 
 def _check_bundle(path: str, key: str | None) -> Iterator[str]:
     stored, altered = read_bundle(path)
-    yield f"files: {len(stored)}, {'not all' if altered else 'all'} hashes agree"
+    yield f"files: {len(stored)}, {'not as packed' if altered else 'all hashes agree'}"
     yield from (contents.WRONG + text for text in altered)
     if key is None and not {SIGNATURE, PUBLIC_KEY} & stored.keys():
         yield "signature: none"

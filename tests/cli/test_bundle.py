@@ -186,9 +186,9 @@ def archive(folder, *members, how=zipfile.ZIP_STORED):
     return path
 
 
-def cut(folder, whole, size):
+def cut(folder, whole, size, end=b""):
     path = folder / "cut.eln"
-    path.write_bytes(whole.read_bytes()[:size])
+    path.write_bytes(whole.read_bytes()[:size] + end)
     return path
 
 
@@ -203,6 +203,8 @@ def cut(folder, whole, size):
             "is compressed",
         ),
         (lambda folder, whole: cut(folder, whole, 1000), "cannot be read"),
+        # Where the directory begins: files are then looked for elsewhere.
+        (lambda folder, whole: cut(folder, whole, -6, b"\1" * 4 + bytes(2)), "was altered"),
     ],
 )
 def test_what_is_no_bundle_is_refused_in_words(make, said, bundle, call, tmp_path):
