@@ -133,8 +133,7 @@ def read_bundle(path: str | os.PathLike[str]) -> tuple[dict[str, bytes], list[st
     rows, again = (text.decode("utf-8", "replace").splitlines() for text in lists)
     names = sorted({row.partition("  ")[2] for row in {*rows} ^ {*again}})
     faults = [f"{name} is not as {SUMS} has it" for name in names]
-    if not faults and rows != again:
-        faults = [f"{SUMS} is not as rig writes it"]
+    faults = faults or [f"{SUMS} is not as rig writes it"] * (rows != again)
     # The archive has a checksum of each file too: an altered file shows around it as well.
     return files, faults if faults or place.is_dir() else _check_archive(files, data)
 
