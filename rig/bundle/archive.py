@@ -147,12 +147,12 @@ def _members(place: Path, data: bytes) -> dict[str, bytes]:
     except (zipfile.BadZipFile, ValueError, NotImplementedError, OverflowError) as error:
         raise _foreign(place, f"its archive cannot be read ({error})") from error
     for member in members:
-        name, size = member.filename, member.compress_size
+        name = member.filename
         begin = member.header_offset + _LOCAL_HEADER + len(name.encode())
         is_inside = name.startswith(ROOT) and ".." not in name.split("/")
         if member.compress_type != zipfile.ZIP_STORED or not is_inside:
             raise _foreign(place, f"{name!r:.60} is compressed, or outside of {ROOT}")
-        files[name.removeprefix(ROOT)] = data[begin : begin + size]
+        files[name.removeprefix(ROOT)] = data[begin : begin + member.compress_size]
     # Read as if bytes stood before all files, or some of them twice.
     if sum(map(len, files.values())) > len(data) or any(m.header_offset for m in members[:1]):
         raise _foreign(place, "its directory was altered")
