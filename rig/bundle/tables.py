@@ -141,7 +141,7 @@ def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
         elif isinstance(value, dict):
             columns |= flatten(value, f"{name}_")
         elif isinstance(value, (list, tuple)):
-            if not any(isinstance(item, dict) for item in value):
+            if dict not in map(type, value):
                 columns[name] = "; ".join(map(str, value))
         else:
             columns[name] = value
