@@ -13,6 +13,7 @@ from rig.design.trials import readable, trials, trials_text
 from rig.files import write_atomic
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
+from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
 from rig.reasons import rig_error
 from rig.report.design import design_lines
@@ -30,7 +31,7 @@ def main(arguments: Arguments) -> None:
     if limits.lowest > limits.highest:
         raise rig_error("beams_reversed")
     layouts: dict[str, Any] = {
-        "runs": len(protocol.plan.inclines) * protocol.plan.repeats,
+        "runs": len(runs(protocol)),
         "scatter": "learned" if learned else "stated",
         "current": _forecast(protocol, components),
     }
