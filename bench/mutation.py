@@ -46,7 +46,7 @@ _MEMORY_BYTES = 6 << 30
 _PATIENCE = 10.0
 """How many times as long as before tests may take until a fault counts as one that hangs."""
 _MOST_S = 60.0
-"""What the tests of a fault may take together, without it."""
+"""What the tests of a fault from other rooms may take together, without it."""
 _START_S = 120.0  # until pytest has loaded everything, on a busy machine
 ROOMS = {
     "analysis": ("rig/analysis", "rig/results"),
@@ -64,7 +64,7 @@ _HEAD = """\
 # Faults put into the source
 
 `./run bench mutation`: {count} faults drawn by seed {seed}, one at a time, each tried by the tests
-that run through its line, the quickest of them that take a minute together."""
+that run through its line: all of its room's, and a minute of the others, the quickest first."""
 
 
 class Mutant(NamedTuple):
@@ -128,7 +128,7 @@ class Reached:
         own = f"tests/{path.split('/')[1]}/"
         ranked = sorted((names[n] for n in sorted(found)), key=self.seconds.__getitem__)
         ranked.sort(key=lambda one: not one.startswith(own))
-        spent = accumulate(self.seconds[one] for one in ranked)
+        spent = accumulate(self.seconds[one] * (not one.startswith(own)) for one in ranked)
         return [one for one, seconds in zip(ranked, spent, strict=True) if seconds <= _MOST_S]
 
 
