@@ -25,6 +25,12 @@ _BRACKET_OR_QUOTED = re.compile(r"\"[^\"]*(?:\"|$)|'[^']*(?:'|$)|[\[\]{}]")
 _QUOTE = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'|(?<![^\s\[{,:])(?P<open>[\"'])[^\n]*")
 NOT_READABLE = "this line cannot be read from here on: see its quotes, brackets, colons and indent"
 _MISTAKES = [re.split(r" +\| ", row, maxsplit=3) for row in read_paragraphs(__file__)[0]]
+_COMPOSED = {
+    "but found another document": "a second document; a file has one protocol",
+    "second occurrence": "an anchor of this name is given above; choose another name",
+    "found undefined alias": "no anchor stands before the alias",
+}
+"""What PyYAML's composer refuses, and in which words."""
 _NEW = {"nothing": "", "blank": " ", "colon": ": "}
 Mend = tuple[int, str, str]
 """A place in a text, what is wrong there, and the text as it should be."""
@@ -55,6 +61,9 @@ def explain(text: str, error: yaml.MarkedYAMLError) -> tuple[int, str]:
         An index in `text`, and a sentence.
     """
     stop = min(_stop(error), len(text))
+    if isinstance(error, yaml.composer.ComposerError):
+        words, mark, name = str(error.problem).partition(" '")
+        return stop, f"{_COMPOSED.get(words, words)}{mark}{name}"
     begin = error.context_mark.index if error.context_mark else stop
     at = _visible(text, stop)
     farther = None
