@@ -15,7 +15,7 @@ from rig.protocol.masses import place_masses
 from rig.protocol.protocol import RodChain
 from rig.protocol.rods import check_apart, count_rods, list_rods, place_rods
 from rig.protocol.yamltree import Mapping, Sequence
-from rig.units import quote
+from rig.units import did_you_mean, quote
 
 _LONGEST_NAME = 32
 
@@ -71,7 +71,7 @@ def _base_problem(base: str, read: Collection[str], candidates: list[str]) -> st
     """Return why a chain cannot be `like` another; empty if it can."""
     if base not in candidates:
         accepted = ", ".join(map(quote, candidates)) or "no other chain is there"
-        return f"found {quote(base)}; {fields.did_you_mean(base, candidates)}accepted: {accepted}"
+        return f"found {quote(base)}; {did_you_mean(base, candidates)}accepted: {accepted}"
     return "" if base in read else "like refers back to itself; describe one chain in full"
 
 

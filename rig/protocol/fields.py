@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 from rig.errors import Problem
 from rig.protocol import keys
 from rig.protocol.yamltree import Mapping, Node, Place, ScalarNode, Sequence
-from rig.units import UnitError, parse, quote
+from rig.units import UnitError, did_you_mean, parse, quote
 
 
 @dataclass(slots=True)
@@ -154,15 +154,6 @@ def join(path: str, key: str) -> str:
     return f"{path}.{word}" if path else word
 
 
-def did_you_mean(word: str, accepted: Iterable[str]) -> str:
-    """Return ``did you mean …? `` for the nearest accepted word, or nothing."""
-    import difflib  # noqa: PLC0415 - only a mistake needs it
-
-    folded = {name.casefold(): name for name in accepted}
-    close = difflib.get_close_matches(word[:40].casefold(), folded, n=1)
-    return f"did you mean {folded[close[0]]}? " if close else ""
-
-
 def unique_entries(
     node: Mapping, path: str, faults: Faults
 ) -> tuple[dict[str, Place], dict[str, Node]]:
@@ -203,7 +194,7 @@ def read_value(accepted: keys.Accepted, node: Node, path: str, table: str, fault
             kind, table = each or keys.Plain.MAPPED, f"{table}.{keys.EACH}"
             paths = ((f"{path}[{n}]", item) for n, item in enumerate(items))
             return tuple(read_value(kind, item, at, table, faults) for at, item in paths)
-    message = f"found {node}; accepted: {_form(accepted)}"
+    message = f"found {node}; accepted: {accepted}"
     if isinstance(node, ScalarNode):
         try:
             return _read_scalar(accepted, node)
@@ -245,21 +236,7 @@ def _read_scalar(accepted: keys.Accepted, node: ScalarNode) -> Any:
             raise UnitError(f"{refusal} with control characters; accepted: plain text")
         case keys.Plain.TEXT if node.kind != "nothing":
             raise UnitError(f'{refusal}, which is {node.kind}; accepted: text, in quotes: "{node}"')
-    raise UnitError(f"{refusal}; {close}accepted: {_form(accepted)}")
-
-
-def _form(accepted: keys.Accepted) -> str:
-    """Return the accepted notation of a value, for messages."""
-    match accepted:
-        case keys.Range():
-            return f"{accepted.dimension.noun}, {accepted}"
-        case keys.ListOf():
-            return str(accepted).replace("a list", "a list [ … , … ]")
-        case keys.Plain.MAPPED:
-            return "a mapping {key: value, …}"
-        case keys.Either(kinds):
-            return "; or ".join(map(_form, kinds))
-    return str(accepted)
+    raise UnitError(f"{refusal}; {close}accepted: {accepted}")
 
 
 def _read_default(key: keys.Key) -> Any:

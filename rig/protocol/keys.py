@@ -92,13 +92,13 @@ class ListOf(NamedTuple):
     each: Accepted | None = None
 
     def __str__(self) -> str:
-        return "a list" if self.each is None else f"a list of values, {self.each}"
+        return "a list [ … , … ]" + (f" of values, {self.each}" if self.each else "")
 
 
 class Plain(StrEnum):
     """A mapping, with keys of the table or names chosen by the file; or any text."""
 
-    MAPPED = "keys"
+    MAPPED = "a mapping {key: value, …}"
     TEXT = "text"
 
 
@@ -157,8 +157,10 @@ def _read_accepted(text: str) -> Accepted:
         return Either(tuple(map(_read_accepted, text.split(" / "))))
     kind, _, rest = text.partition(" ")
     match kind:
-        case "keys" | "text":
-            return Plain(kind)
+        case "keys":
+            return Plain.MAPPED
+        case "text":
+            return Plain.TEXT
         case "whole":
             return Whole(*map(int, rest.split()))
         case "words":
