@@ -26,8 +26,8 @@ class Faults:
 
     def add(self, place: Place, key: str, message: str) -> None:
         """Note a problem; a fault that chains inherit by `like` is noted once, at its place."""
-        at = (place.line, place.column, message)
-        self.problems.setdefault(at, Problem(self.source, place.line, place.column, key, message))
+        problem = Problem(self.source, *place, key, message)
+        self.problems.setdefault((*place, message), problem)
 
 
 class UnsoundError(Exception):
@@ -47,8 +47,6 @@ class Section:
         Key path in the table, see `rig.protocol.keys.ANY`.
     faults
         Collects the problems.
-    lenient
-        Do not note missing keys (used when the chain named by `like` is itself faulty).
 
     Attributes
     ----------
@@ -56,10 +54,8 @@ class Section:
         Values by key, as read, or defaults; `None` if faulty, or missing without a default.
     """
 
-    def __init__(
-        self, node: Mapping, path: str, table: str, faults: Faults, *, lenient: bool = False
-    ) -> None:
-        self.node, self.path, self.faults, self.lenient = node, path, faults, lenient
+    def __init__(self, node: Mapping, path: str, table: str, faults: Faults) -> None:
+        self.node, self.path, self.faults = node, path, faults
         self.keys, self.nodes = unique_entries(node, path, faults)
         self._accepted = keys.SECTIONS[table]
         self._faulty: set[str] = set()
@@ -99,7 +95,7 @@ class Section:
             return None if others else first
         self._faulty.update(names)
         # A seemingly missing key may be misspelt.
-        if not self.lenient and not any(did_you_mean(name, names) for name in self._unknown):
+        if not self.node.partial and not any(did_you_mean(name, names) for name in self._unknown):
             examples = (f"{name}: {keys.example(self._accepted[name])}" for name in names)
             message = f"missing; write for example {', or '.join(examples)}"
             self.faults.add(self.node.place, self.key(names[0]), message)

@@ -10,8 +10,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import count
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -25,7 +26,6 @@ _BREAK = re.compile(r"\r\n|[\n\r\x85\u2028\u2029]")
 """Line breaks of YAML 1.1, section 5.4, by which PyYAML counts lines."""
 _TAB = re.compile(r"^[^\t#\n]*\t", re.MULTILINE)
 """A tab outside comments, which YAML accepts only in some places."""
-_TOO_DEEP = f"more than {MAX_DEPTH} levels of brackets or indents"
 _EXCERPT = 72  # columns of a terminal of 80, less an indent
 
 # Scalars of the YAML 1.2 core schema (section 10.3.2); anything else is text, so
@@ -39,8 +39,7 @@ _CORE = (
 )
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Place:
+class Place(NamedTuple):
     """Line and column, counted from 1."""
 
     line: int
@@ -80,10 +79,14 @@ class Sequence:
 
 @dataclass(slots=True)
 class Mapping:
-    """A mapping; entries in file order, repeated keys included."""
+    """A mapping; entries in file order, repeated keys included.
+
+    `partial` if further keys are not known: those that a chain takes over from a faulty one.
+    """
 
     place: Place
     entries: list[tuple[Node, Node]]
+    partial: bool = False
 
     def get(self, name: str | int) -> Node | None:
         """Return the first value of a key."""
@@ -142,14 +145,12 @@ def load(text: str, source: str) -> Node:
         from rig.protocol.yamlmend import explain  # noqa: PLC0415 - only a mistake needs it
 
         index, message = explain(body, error)
-    except RecursionError:
-        index, message = 0, _TOO_DEEP
-    except (yaml.YAMLError, ValueError, ArithmeticError, LookupError):
+    except (yaml.YAMLError, ValueError, ArithmeticError, LookupError, RecursionError):
         # The parser leaks int() and chr() errors of broken escapes and directives.
-        index, message = 0, "this file cannot be read; see its quotes and % lines"
+        index, message = 0, "this file cannot be read; see its quotes, brackets and % lines"
     place = place_at(body, index)
     below = _excerpt(body, place)
-    raise InputError(problems=[Problem(source, place.line, place.column, "", message, below)])
+    raise InputError(problems=[Problem(source, *place, "", message, below)])
 
 
 class _RefusalError(Exception):
@@ -201,8 +202,8 @@ def _translate(node: Any, numbers: Iterator[int], depth: int) -> Node:
             raise _RefusalError(at, "half of a surrogate pair; write the character itself")
         return ScalarNode(node.value, node.style is None, place)
     if depth >= MAX_DEPTH:  # or an alias of what is around it
-        raise _RefusalError(at, _TOO_DEEP)
+        raise _RefusalError(at, f"more than {MAX_DEPTH} levels of brackets or indents")
+    inner = partial(_translate, numbers=numbers, depth=depth + 1)
     if isinstance(node, yaml.SequenceNode):
-        return Sequence(place, [_translate(item, numbers, depth + 1) for item in node.value])
-    parts = [_translate(part, numbers, depth + 1) for entry in node.value for part in entry]
-    return Mapping(place, list(zip(parts[::2], parts[1::2], strict=True)))
+        return Sequence(place, [*map(inner, node.value)])
+    return Mapping(place, [(inner(key), inner(value)) for key, value in node.value])
