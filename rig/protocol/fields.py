@@ -190,17 +190,14 @@ def read_value(accepted: keys.Accepted, node: Node, path: str, table: str, fault
             kind, table = each or keys.Plain.MAPPED, f"{table}.{keys.EACH}"
             paths = ((f"{path}[{n}]", item) for n, item in enumerate(items))
             return tuple(read_value(kind, item, at, table, faults) for at, item in paths)
-    message = f"found {node}; accepted: {accepted}"
-    if isinstance(node, ScalarNode):
-        try:
-            return _read_scalar(accepted, node)
-        except UnitError as error:
-            message = str(error)
-    faults.add(node.place, path, message)
+    try:
+        return _read_scalar(accepted, node)
+    except UnitError as error:
+        faults.add(node.place, path, str(error))
     return None
 
 
-def _read_scalar(accepted: keys.Accepted, node: ScalarNode) -> Any:
+def _read_scalar(accepted: keys.Accepted, node: Node) -> Any:
     """Return the value of a scalar in base units.
 
     Raises
@@ -208,31 +205,31 @@ def _read_scalar(accepted: keys.Accepted, node: ScalarNode) -> Any:
     UnitError
         The value is not accepted; names the value and the accepted forms.
     """
-    refusal, close = f"found {node}", ""
-    match accepted:
-        case keys.Range() if node.kind not in {"nothing", "a boolean"}:
-            quantity = parse(node.text, accepted.dimension)
+    close = ""
+    match accepted, node:
+        case keys.Range(), ScalarNode(text, kind=kind) if kind not in {"nothing", "a boolean"}:
+            quantity = parse(text, accepted.dimension)
             if quantity.value not in accepted:
-                raise UnitError(f"found {node.text}; accepted: {accepted}")
+                raise UnitError(f"found {text}; accepted: {accepted}")
             if accepted.exact and quantity.u > 0:
-                raise UnitError(f"{refusal}; {accepted.exact}")
+                raise UnitError(f"found {node}; {accepted.exact}")
             return quantity.value if accepted.exact else quantity
-        case keys.Whole(low, high) if node.kind == "a whole number" and len(node.text) <= 30:
-            number = int(node.text, {"0o": 8, "0x": 16}.get(node.text[:2], 10))
+        case keys.Whole(low, high), ScalarNode(text, kind="a whole number") if len(text) <= 30:
+            number = int(text, {"0o": 8, "0x": 16}.get(text[:2], 10))
             if low <= number <= high:
                 return number
-        case keys.OneOf(words):
-            if node.text in words:
-                return keys.BOOLEANS.get(node.text, node.text)
-            close = did_you_mean(node.text, words)
-        case keys.Plain.TEXT if node.kind == "text":
+        case keys.OneOf(words), ScalarNode(text):
+            if text in words:
+                return keys.BOOLEANS.get(text, text)
+            close = did_you_mean(text, words)
+        case keys.Plain.TEXT, ScalarNode(text, kind="text"):
             # An escape sequence in a title would act on the terminal that shows it.
-            if all(character.isprintable() or character == "\n" for character in node.text):
-                return node.text
-            raise UnitError(f"{refusal} with control characters; accepted: plain text")
-        case keys.Plain.TEXT if node.kind != "nothing":
-            raise UnitError(f'{refusal}, which is {node.kind}; accepted: text, in quotes: "{node}"')
-    raise UnitError(f"{refusal}; {close}accepted: {accepted}")
+            if all(character.isprintable() or character == "\n" for character in text):
+                return text
+            raise UnitError(f"found {node} with control characters; accepted: plain text")
+        case keys.Plain.TEXT, ScalarNode(kind=kind) if kind != "nothing":
+            raise UnitError(f'found {node}, which is {kind}; accepted: text, in quotes: "{node}"')
+    raise UnitError(f"found {node}; {close}accepted: {accepted}")
 
 
 def _read_default(key: keys.Key) -> Any:
