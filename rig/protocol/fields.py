@@ -220,7 +220,7 @@ def _read_scalar(accepted: keys.Accepted, node: Node) -> Any:
                 return number
         case keys.OneOf(words), ScalarNode(text):
             if text in words:
-                return keys.BOOLEANS.get(text, text)
+                return keys.BOOLEANS.get(text.lower(), text)
             close = did_you_mean(text, words)
         case keys.Plain.TEXT, ScalarNode(text, kind="text"):
             # An escape sequence in a title would act on the terminal that shows it.

@@ -99,14 +99,11 @@ def check_clear(top: Section, chains: Collection[RodChain], inclines: Iterable[f
         rod = blocking_rod(rods, height)
         if height < lowest:
             needed = _mm(math.ceil(lowest * 1e4) / 1e4)
-            why = (
-                f"; a rod at rest on the surface would block the beam: at least {needed} is needed"
-            )
+            why = f"; a rod at rest on the surface blocks this beam: at least {needed} is needed"
         elif rod is not None:
             clear = " or ".join(_mm(z) for z in _clear_heights(height, rods, lowest, top_rod))
-            why = (
-                f", which {only or f'{part} {rod.number} of {rod.chain}'} blocks before the release"
-            )
+            blocking = only or f"{part} {rod.number} of {rod.chain}"
+            why = f", which {blocking} blocks before the release"
             why += f"; the nearest clear heights are {clear}" if clear else ""
         elif height > top_rod:
             start = only or f"the top {part}"

@@ -20,16 +20,8 @@ ANY = "*"
 """Placeholder in a path for names chosen by the file: those of chains."""
 EACH = "[]"
 """Placeholder in a path for each item of a list."""
-BOOLEANS = {
-    "true": True,
-    "True": True,
-    "TRUE": True,
-    "false": False,
-    "False": False,
-    "FALSE": False,
-}
-"""Booleans of YAML 1.2 (core schema, section 10.3.2)."""
-
+BOOLEANS = {"true": True, "false": False}
+"""Words that stand for a boolean, in whichever of the accepted spellings."""
 
 MOST_RODS = 1000
 """Most rods of a chain, in all its groups."""

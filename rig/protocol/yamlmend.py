@@ -112,16 +112,13 @@ def _list_spans(text: str, at: int, begin: int) -> dict[str, list[tuple[int, int
             brackets.append(mark.start())
         elif mark.group() in _BRACKETS.values():
             brackets = brackets[:-1]
+    opened = [n for n in brackets if text[n : n + 1] in _BRACKETS][-1:]
     before = _line_start(text, max(_line_start(text, begin) - 1, 0))
     return {
         "line": [(_line_start(text, at), _line_end(text, at))],
         "around": [(before, _line_end(text, at))],
         "quote": [(n, _line_end(text, n)) for n in sorted(quotes) if text[n : n + 1] in _QUOTES],
-        "bracket": [
-            (n, max(at + 1, _line_end(text, n)))
-            for n in brackets[-1:]
-            if text[n : n + 1] in _BRACKETS
-        ],
+        "bracket": [(n, max(at + 1, _line_end(text, n))) for n in opened],
     }
 
 
