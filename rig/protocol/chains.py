@@ -57,9 +57,8 @@ def read_chains(top: Section) -> dict[str, RodChain | None]:
             own = _inherit(described[name], others, partial=partial)
         section: Section | None = read_value(Plain.MAPPED, own, path, "chains.*", faults)
         chains[name] = None
-        if section is not None:
-            with suppress(UnsoundError):
-                chains[name] = _build_chain(name, section, top)
+        with suppress(UnsoundError):
+            chains[name] = _build_chain(name, section, top) if section else None
     return {name: chains[name] for name in nodes}
 
 
