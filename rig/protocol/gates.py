@@ -98,16 +98,17 @@ def check_clear(top: Section, chains: Collection[RodChain], inclines: Iterable[f
         height = gate["height"]
         rod = blocking_rod(rods, height)
         if height < lowest:
-            needed = _mm(math.ceil(lowest * 1e4) / 1e4)
-            why = f"; a rod at rest on the surface blocks this beam: at least {needed} is needed"
+            least = _mm(math.ceil(lowest * 1e4) / 1e4)
+            why = f"; a rod at rest on the surface would block the beam: at least {least} is needed"
         elif rod is not None:
             clear = " or ".join(_mm(z) for z in _clear_heights(height, rods, lowest, top_rod))
             blocking = only or f"{part} {rod.number} of {rod.chain}"
             why = f", which {blocking} blocks before the release"
             why += f"; the nearest clear heights are {clear}" if clear else ""
         elif height > top_rod:
-            start = only or f"the top {part}"
-            why = f"; no {part} passes above {_mm(top_rod)}, where {start} starts"
+            passes = f"{only} does not pass" if only else f"no {part} passes"
+            start = "it starts" if only else f"the top {part} starts"
+            why = f"; {passes} above {_mm(top_rod)}, where {start}"
         else:
             continue
         gate.fault("height", f"found {_mm(height)}{why}")
