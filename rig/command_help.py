@@ -99,11 +99,10 @@ class Parser(argparse.ArgumentParser):
 
     def _check_value(self, action: argparse.Action, value: object) -> None:
         if action.choices is not None and value not in action.choices:
-            from difflib import get_close_matches  # noqa: PLC0415 - only a mistake needs it
+            from rig.units import did_you_mean  # noqa: PLC0415 - only a mistake needs it
 
             accepted = list(map(str, action.choices))
-            likely = get_close_matches(str(value), accepted, n=1)
-            guess = f"did you mean {likely[0]}? " if likely else ""
+            guess = did_you_mean(str(value), accepted)
             raise argparse.ArgumentError(
                 action, f"found '{value}'; {guess}accepted: {', '.join(accepted)}"
             )

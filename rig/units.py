@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
@@ -105,6 +105,18 @@ def quote(text: str, limit: int = 40) -> str:
     return repr(text if len(text) <= limit else text[:limit] + "…")
 
 
+def did_you_mean(word: str, accepted: Iterable[str], least: float = 0.6) -> str:
+    """Return ``did you mean …? `` for the nearest accepted word, or nothing.
+
+    `least` is how near that has to be, from 0 to 1 for the same word.
+    """
+    import difflib  # noqa: PLC0415 - only a mistake needs it
+
+    folded = {name.casefold(): name for name in accepted}
+    close = difflib.get_close_matches(word[:40].casefold(), folded, n=1, cutoff=least)
+    return f"did you mean {folded[close[0]]}? " if close else ""
+
+
 def parse(text: str | float, dimension: Dimension) -> Quantity:
     """Read a quantity of a given dimension.
 
@@ -180,11 +192,7 @@ def _factor(unit: str | None, dimension: Dimension, text: str) -> Fraction:
     name = _ALIASES.get(name, _POWER.sub("^", name))
     accepted = f"{dimension.noun} is written in {', '.join(dimension.factors)}"
     if name not in UNITS:
-        import difflib  # noqa: PLC0415 - only a mistake needs it
-
-        folded = {accepted_unit.casefold(): accepted_unit for accepted_unit in dimension.factors}
-        close = difflib.get_close_matches(name.casefold(), folded, n=1, cutoff=0.5)
-        guess = f"did you mean {folded[close[0]]}? " if close else ""
+        guess = did_you_mean(name, dimension.factors, least=0.5)
         raise UnitError(f"unknown unit {quote(unit or '')}; {guess}{accepted}")
     measures, factor = UNITS[name]
     if measures is not dimension:

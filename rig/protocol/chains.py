@@ -8,14 +8,13 @@ from contextlib import suppress
 from typing import Any
 
 from rig.model.chain import XI, Chain
-from rig.protocol import fields
-from rig.protocol.fields import Section, join
+from rig.protocol.fields import Section, UnsoundError, join, read_value, unique_entries
 from rig.protocol.keys import Plain
 from rig.protocol.masses import place_masses
 from rig.protocol.protocol import RodChain
 from rig.protocol.rods import check_apart, count_rods, list_rods, place_rods
 from rig.protocol.yamltree import Mapping, Sequence
-from rig.units import quote
+from rig.units import did_you_mean, quote
 
 _LONGEST_NAME = 32
 
@@ -36,7 +35,7 @@ def read_chains(top: Section) -> dict[str, RodChain | None]:
     node, faults = top["chains"], top.faults
     if node is None:
         return {}
-    places, nodes = fields.unique_entries(node, "chains", faults)
+    places, nodes = unique_entries(node, "chains", faults)
     if not 1 <= len(nodes) <= 2:
         faults.add(node.place, "chains", f"found {len(nodes)} chains; one or two are accepted")
     for name, place in places.items():
@@ -47,23 +46,19 @@ def read_chains(top: Section) -> dict[str, RodChain | None]:
     likes: dict[str, Any] = {name: own.get("like") for name, own in described.items()}
     bases = {name: like for name, like in likes.items() if getattr(like, "kind", "") == "text"}
     chains: dict[str, RodChain | None] = {}
-    for name in nodes.keys() - described.keys():
-        path = join("chains", name)
-        chains[name] = fields.read_value(Plain.MAPPED, nodes[name], path, "chains", faults)
-    for name in sorted(described, key=lambda name: name in bases):
-        path, own, lenient = join("chains", name), described[name], False
+    for name in sorted(nodes, key=bases.__contains__):
+        own, path = nodes[name], join("chains", name)
         if name in bases:
             base = bases[name].text
             message = _base_problem(base, chains, [chain for chain in nodes if chain != name])
             if message:
                 faults.add(bases[name].place, f"{path}.like", message)
-            if base in described:
-                own = _inherit(own, described[base])
-            lenient = chains.get(base) is None
-        section = Section(own, path, "chains.*", faults, lenient=lenient)
+            others, partial = described.get(base, Mapping(node.place, [])), chains.get(base) is None
+            own = _inherit(described[name], others, partial=partial)
+        section: Section | None = read_value(Plain.MAPPED, own, path, "chains.*", faults)
         chains[name] = None
-        with suppress(fields.UnsoundError):
-            chains[name] = _build_chain(name, section, top)
+        with suppress(UnsoundError):
+            chains[name] = _build_chain(name, section, top) if section else None
     return {name: chains[name] for name in nodes}
 
 
@@ -71,11 +66,11 @@ def _base_problem(base: str, read: Collection[str], candidates: list[str]) -> st
     """Return why a chain cannot be `like` another; empty if it can."""
     if base not in candidates:
         accepted = ", ".join(map(quote, candidates)) or "no other chain is there"
-        return f"found {quote(base)}; {fields.did_you_mean(base, candidates)}accepted: {accepted}"
+        return f"found {quote(base)}; {did_you_mean(base, candidates)}accepted: {accepted}"
     return "" if base in read else "like refers back to itself; describe one chain in full"
 
 
-def _inherit(own: Mapping, base: Mapping) -> Mapping:
+def _inherit(own: Mapping, base: Mapping, *, partial: bool) -> Mapping:
     """Return a chain's own entries, then those of its base that it does not override."""
     hidden = {"like", *(getattr(key, "text", None) for key, _ in own.entries)}
     if hidden & {"mass", "masses"}:
@@ -85,7 +80,7 @@ def _inherit(own: Mapping, base: Mapping) -> Mapping:
     if "length" in hidden and isinstance(base.get("spacing"), Sequence):
         hidden.add("spacing")
     entries = [entry for entry in base.entries if getattr(entry[0], "text", None) not in hidden]
-    return Mapping(own.place, [*own.entries, *entries])
+    return Mapping(own.place, [*own.entries, *entries], partial)
 
 
 def _build_chain(name: str, section: Section, top: Section) -> RodChain:

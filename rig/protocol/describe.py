@@ -118,7 +118,11 @@ def _list_facts(protocol: Protocol) -> dict[str, Any]:
         "gate": _gate_facts(protocol),
         "prior": _prior_facts(protocol, facts),
         "touch": _touch_facts(protocol),
-        "lack": _lack_facts(wants),
+        "lack": (
+            {"board": board, "lack": problems[0], "more": len(problems) - 1}
+            for board, problems in wants.items()
+            if problems
+        ),
     }
     return facts | {
         f"each_{part}": "\n".join(_write(f"- {part}", facts, each)) for part, each in parts.items()
@@ -168,12 +172,3 @@ def _touch_facts(protocol: Protocol) -> Iterator[Facts]:
         heights = [round(z, 4) for z in touching_heights(protocol.chains[name], incline)]
         low, high = min(heights), max(heights)
         yield {"incline": incline, "name": name, "low": low, "high": high, "unlike": low != high}
-
-
-def _lack_facts(wants: Mapping[str, Sequence[Any]]) -> Iterator[Facts]:
-    """Yield the features that boards lack; for gates only the first."""
-    for board, problems in wants.items():
-        gates = [problem for problem in problems if problem.key.startswith("gates.")]
-        for problem in [problem for problem in problems if problem not in gates] + gates[:1]:
-            more = problem in gates and len(gates) - 1
-            yield {"board": board, "lack": problem, "more": more}

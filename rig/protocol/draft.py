@@ -57,9 +57,8 @@ class Draft:
 
     def trial(self) -> Draft:
         """Return the draft with four drops, at the middle incline."""
-        inclines = [incline.strip() for incline in self.inclines.split(",") if incline.strip()]
-        middle = inclines[len(inclines) // 2] if inclines else ""
-        return replace(self, inclines=middle, repeats=4)
+        inclines = self.inclines.strip(" ,").split(",")
+        return replace(self, inclines=inclines[len(inclines) // 2].strip(), repeats=4)
 
 
 def draft_text(draft: Draft) -> str:
@@ -110,10 +109,8 @@ def _gates(protocol: Protocol, draft: Draft) -> str:
 
 def _share_gates(draft: Draft) -> dict[Side, int]:
     """Return the number of gates on each side; with few gates, most on the free side."""
-    if draft.scene == "one-chain":
-        return {"impact": draft.gates}
     if draft.scene != "two-chains":
-        return {"free": draft.gates}
+        return {"impact" if draft.scene == "one-chain" else "free": draft.gates}
     if draft.gates < 2:
         hint = "for one gate use --scene one-chain"
         raise InputError("two chains need two gates, one on each side", hint)

@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 from rig.errors import Problem
 from rig.protocol import keys
 from rig.protocol.yamltree import Mapping, Node, Place, ScalarNode, Sequence
-from rig.units import UnitError, parse, quote
+from rig.units import UnitError, did_you_mean, parse, quote
 
 
 @dataclass(slots=True)
@@ -27,9 +27,9 @@ class Faults:
 
     def add(self, place: Place, key: str, message: str) -> None:
         """Note a problem; a fault that chains inherit by `like` is noted once, at its place."""
-        at = (place.line, place.column, message)
         told = f"{message} ({self.setting})" if self.setting else message
-        self.problems.setdefault(at, Problem(self.source, place.line, place.column, key, told))
+        problem = Problem(self.source, *place, key, told)
+        self.problems.setdefault((*place, message), problem)
 
 
 class UnsoundError(Exception):
@@ -49,8 +49,6 @@ class Section:
         Key path in the table, see `rig.protocol.keys.ANY`.
     faults
         Collects the problems.
-    lenient
-        Do not note missing keys (used when the chain named by `like` is itself faulty).
 
     Attributes
     ----------
@@ -58,10 +56,8 @@ class Section:
         Values by key, as read, or defaults; `None` if faulty, or missing without a default.
     """
 
-    def __init__(
-        self, node: Mapping, path: str, table: str, faults: Faults, *, lenient: bool = False
-    ) -> None:
-        self.node, self.path, self.faults, self.lenient = node, path, faults, lenient
+    def __init__(self, node: Mapping, path: str, table: str, faults: Faults) -> None:
+        self.node, self.path, self.faults = node, path, faults
         self.keys, self.nodes = unique_entries(node, path, faults)
         self._accepted = keys.SECTIONS[table]
         self._faulty: set[str] = set()
@@ -101,8 +97,8 @@ class Section:
             return None if others else first
         self._faulty.update(names)
         # A seemingly missing key may be misspelt.
-        if not self.lenient and not any(did_you_mean(name, names) for name in self._unknown):
-            examples = (f"{name}: {keys.example(self._accepted[name])}" for name in names)
+        if not self.node.partial and not any(did_you_mean(name, names) for name in self._unknown):
+            examples = (f"{name}: {self._accepted[name].example}" for name in names)
             message = f"missing; write for example {', or '.join(examples)}"
             self.faults.add(self.node.place, self.key(names[0]), message)
         return None
@@ -156,15 +152,6 @@ def join(path: str, key: str) -> str:
     return f"{path}.{word}" if path else word
 
 
-def did_you_mean(word: str, accepted: Iterable[str]) -> str:
-    """Return ``did you mean …? `` for the nearest accepted word, or nothing."""
-    import difflib  # noqa: PLC0415 - only a mistake needs it
-
-    folded = {name.casefold(): name for name in accepted}
-    close = difflib.get_close_matches(word[:40].casefold(), folded, n=1)
-    return f"did you mean {folded[close[0]]}? " if close else ""
-
-
 def unique_entries(
     node: Mapping, path: str, faults: Faults
 ) -> tuple[dict[str, Place], dict[str, Node]]:
@@ -205,17 +192,14 @@ def read_value(accepted: keys.Accepted, node: Node, path: str, table: str, fault
             kind, table = each or keys.Plain.MAPPED, f"{table}.{keys.EACH}"
             paths = ((f"{path}[{n}]", item) for n, item in enumerate(items))
             return tuple(read_value(kind, item, at, table, faults) for at, item in paths)
-    message = f"found {node}; accepted: {_form(accepted)}"
-    if isinstance(node, ScalarNode):
-        try:
-            return _read_scalar(accepted, node)
-        except UnitError as error:
-            message = str(error)
-    faults.add(node.place, path, message)
+    try:
+        return _read_scalar(accepted, node)
+    except UnitError as error:
+        faults.add(node.place, path, str(error))
     return None
 
 
-def _read_scalar(accepted: keys.Accepted, node: ScalarNode) -> Any:
+def _read_scalar(accepted: keys.Accepted, node: Node) -> Any:
     """Return the value of a scalar in base units.
 
     Raises
@@ -223,45 +207,31 @@ def _read_scalar(accepted: keys.Accepted, node: ScalarNode) -> Any:
     UnitError
         The value is not accepted; names the value and the accepted forms.
     """
-    refusal, close = f"found {node}", ""
-    match accepted:
-        case keys.Range() if node.kind not in {"nothing", "a boolean"}:
-            quantity = parse(node.text, accepted.dimension)
+    close = ""
+    match accepted, node:
+        case keys.Range(), ScalarNode(text, kind=kind) if kind not in {"nothing", "a boolean"}:
+            quantity = parse(text, accepted.dimension)
             if quantity.value not in accepted:
-                raise UnitError(f"found {node.text}; accepted: {accepted}")
+                raise UnitError(f"found {text}; accepted: {accepted}")
             if accepted.exact and quantity.u > 0:
-                raise UnitError(f"{refusal}; {accepted.exact}")
+                raise UnitError(f"found {node}; {accepted.exact}")
             return quantity.value if accepted.exact else quantity
-        case keys.Whole(low, high) if node.kind == "a whole number" and len(node.text) <= 30:
-            number = int(node.text, {"0o": 8, "0x": 16}.get(node.text[:2], 10))
+        case keys.Whole(low, high), ScalarNode(text, kind="a whole number") if len(text) <= 30:
+            number = int(text, {"0o": 8, "0x": 16}.get(text[:2], 10))
             if low <= number <= high:
                 return number
-        case keys.OneOf(words):
-            if node.text in words:
-                return keys.BOOLEANS.get(node.text, node.text)
-            close = did_you_mean(node.text, words)
-        case keys.Plain.TEXT if node.kind == "text":
+        case keys.OneOf(words), ScalarNode(text):
+            if text in words:
+                return keys.BOOLEANS.get(text.lower(), text)
+            close = did_you_mean(text, words)
+        case keys.Plain.TEXT, ScalarNode(text, kind="text"):
             # An escape sequence in a title would act on the terminal that shows it.
-            if all(character.isprintable() or character == "\n" for character in node.text):
-                return node.text
-            raise UnitError(f"{refusal} with control characters; accepted: plain text")
-        case keys.Plain.TEXT if node.kind != "nothing":
-            raise UnitError(f'{refusal}, which is {node.kind}; accepted: text, in quotes: "{node}"')
-    raise UnitError(f"{refusal}; {close}accepted: {_form(accepted)}")
-
-
-def _form(accepted: keys.Accepted) -> str:
-    """Return the accepted notation of a value, for messages."""
-    match accepted:
-        case keys.Range():
-            return f"{accepted.dimension.noun}, {accepted}"
-        case keys.ListOf():
-            return str(accepted).replace("a list", "a list [ … , … ]")
-        case keys.Plain.MAPPED:
-            return "a mapping {key: value, …}"
-        case keys.Either(kinds):
-            return "; or ".join(map(_form, kinds))
-    return str(accepted)
+            if all(character.isprintable() or character == "\n" for character in text):
+                return text
+            raise UnitError(f"found {node} with control characters; accepted: plain text")
+        case keys.Plain.TEXT, ScalarNode(kind=kind) if kind != "nothing":
+            raise UnitError(f'found {node}, which is {kind}; accepted: text, in quotes: "{node}"')
+    raise UnitError(f"found {node}; {close}accepted: {accepted}")
 
 
 def _read_default(key: keys.Key) -> Any:

@@ -98,15 +98,12 @@ def check_clear(top: Section, chains: Collection[RodChain], inclines: Iterable[f
         height = gate["height"]
         rod = blocking_rod(rods, height)
         if height < lowest:
-            needed = _mm(math.ceil(lowest * 1e4) / 1e4)
-            why = (
-                f"; a rod at rest on the surface would block the beam: at least {needed} is needed"
-            )
+            least = _mm(math.ceil(lowest * 1e4) / 1e4)
+            why = f"; a rod at rest on the surface would block the beam: at least {least} is needed"
         elif rod is not None:
             clear = " or ".join(_mm(z) for z in _clear_heights(height, rods, lowest, top_rod))
-            why = (
-                f", which {only or f'{part} {rod.number} of {rod.chain}'} blocks before the release"
-            )
+            blocking = only or f"{part} {rod.number} of {rod.chain}"
+            why = f", which {blocking} blocks before the release"
             why += f"; the nearest clear heights are {clear}" if clear else ""
         elif height > top_rod:
             passes = f"{only} does not pass" if only else f"no {part} passes"
@@ -121,13 +118,12 @@ def _clear_heights(
     height: float, rods: Iterable[HangingRod], lowest: float, top: float
 ) -> list[float]:
     """Return the nearest heights below and above that no rod blocks, to 0.1 mm."""
+    edges = [edge for rod in rods for edge in (rod.low, rod.high)]
     # A rounded edge may lie inside its rod by a rounding error: the next step is outside.
-    below = {math.floor(rod.low * 1e4) - step for rod in rods for step in (0, 1)}
-    above = {math.ceil(rod.high * 1e4) + step for rod in rods for step in (0, 1)}
-    tenths = [z for z in below | above if blocking_rod(rods, z / 1e4) is None]
-    lower = max((z for z in tenths if z / 1e4 < height), default=0)
-    upper = min((z for z in tenths if z / 1e4 > height), default=0)
-    return [z / 1e4 for z in (lower, upper) if max(lowest, 1e-4) <= z / 1e4 <= top]
+    near = {(math.floor(edge * 1e4) + step) / 1e4 for edge in edges for step in (-1, 0, 1, 2)}
+    clear = [z for z in sorted(near) if blocking_rod(rods, z) is None]
+    nearest = [z for z in clear if z < height][-1:] + [z for z in clear if z > height][:1]
+    return [z for z in nearest if max(lowest, 1e-4) <= z <= top]
 
 
 def _mm(height: float) -> str:

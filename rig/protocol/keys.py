@@ -20,16 +20,8 @@ ANY = "*"
 """Placeholder in a path for names chosen by the file: those of chains."""
 EACH = "[]"
 """Placeholder in a path for each item of a list."""
-BOOLEANS = {
-    "true": True,
-    "True": True,
-    "TRUE": True,
-    "false": False,
-    "False": False,
-    "FALSE": False,
-}
-"""Booleans of YAML 1.2 (core schema, section 10.3.2)."""
-
+BOOLEANS = {"true": True, "false": False}
+"""Words that stand for a boolean, in whichever of the accepted spellings."""
 
 MOST_RODS = 1000
 """Most rods of a chain, in all its groups."""
@@ -92,13 +84,13 @@ class ListOf(NamedTuple):
     each: Accepted | None = None
 
     def __str__(self) -> str:
-        return "a list" if self.each is None else f"a list of values, {self.each}"
+        return "a list [ … , … ]" + (f" of values, {self.each}" if self.each else "")
 
 
 class Plain(StrEnum):
     """A mapping, with keys of the table or names chosen by the file; or any text."""
 
-    MAPPED = "keys"
+    MAPPED = "a mapping {key: value, …}"
     TEXT = "text"
 
 
@@ -157,8 +149,10 @@ def _read_accepted(text: str) -> Accepted:
         return Either(tuple(map(_read_accepted, text.split(" / "))))
     kind, _, rest = text.partition(" ")
     match kind:
-        case "keys" | "text":
-            return Plain(kind)
+        case "keys":
+            return Plain.MAPPED
+        case "text":
+            return Plain.TEXT
         case "whole":
             return Whole(*map(int, rest.split()))
         case "words":
@@ -196,18 +190,3 @@ def range_of(path: str) -> Range:
     """Return the range of a key that is a quantity, or of the items of a list of quantities."""
     accepted = KEYS[path].accepted
     return next(kind for kind in getattr(accepted, "kinds", (accepted,)) if isinstance(kind, Range))
-
-
-_BRACKETS = (("", "{", "}"), (f".{EACH}", "[{", "}]"), (f".{ANY}", "{A: {", ", …}}"))
-
-
-def example(key: Key) -> str:
-    """Return an example of a key as in a file: its own, or those of its required keys."""
-    if key.example:
-        return key.example
-    for part, before, after in _BRACKETS:
-        if key.path + part in SECTIONS:
-            keys = SECTIONS[key.path + part].items()
-            text = ", ".join(f"{name}: {example(inner)}" for name, inner in keys if inner.required)
-            return f"{before}{text}{after}"
-    raise KeyError(key.path)

@@ -42,22 +42,15 @@ def place_masses(chain: Section, heights: RodValues) -> RodValues:
 
 def _interpolate(masses: Section, heights: RodValues) -> RodValues:
     """Return masses by linear interpolation in a table."""
-    points = [(point["height"], point["mass"]) for point in masses["table"]]
-    for n, ((low, _), (high, _)) in enumerate(pairwise(points), start=1):
+    import numpy as np  # noqa: PLC0415 - most chains have no table
+
+    table = masses["table"]
+    places = [point["height"] for point in table]
+    for n, (low, high) in enumerate(pairwise(places), start=1):
         if low >= high:
-            masses["table"][n].reject("height", "heights must increase from point to point")
-    lowest, highest = points[0][0], points[-1][0]
+            table[n].reject("height", "heights must increase from point to point")
     # Rounding may raise a height that is summed from rods above the written value.
-    if lowest > 0.0 or highest < heights[-1] * (1.0 - 1e-12):
-        message = f"runs from {lowest:g} m to {highest:g} m; the rods are from 0 m"
+    if places[0] > 0.0 or places[-1] < heights[-1] * (1.0 - 1e-12):
+        message = f"runs from {places[0]:g} m to {places[-1]:g} m; the rods are from 0 m"
         masses.reject("table", f"{message} to {heights[-1]:g} m")
-    return tuple(_mass_at(points, height) for height in heights)
-
-
-def _mass_at(points: list[tuple[float, float]], height: float) -> float:
-    """Return the interpolated mass at a height within the points."""
-    for (low, mass), (high, upper_mass) in pairwise(points):
-        if height <= high:
-            share = (height - low) / (high - low)
-            return mass * (1.0 - share) + upper_mass * share
-    return points[-1][1]
+    return tuple(np.interp(heights, places, [point["mass"] for point in table]).tolist())

@@ -111,7 +111,7 @@ def _locate(protocol: Protocol, message: str, *path: str | int) -> Problem:
     place = place_of(load(protocol.text, protocol.source), *path)
     steps = (f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
     key = "".join(steps).removeprefix(".")
-    return Problem(protocol.source, place.line, place.column, key, message)
+    return Problem(protocol.source, *place, key, message)
 
 
 def passing_rods(protocol: Protocol, gate: Gate) -> dict[str, int]:

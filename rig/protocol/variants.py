@@ -69,5 +69,5 @@ def _entries(node: Node | None) -> list[tuple[Node, Node]]:
 def _find(node: Node | None, way: list[str]) -> Node | None:
     """Return the value at a path of keys; `None` if there is none."""
     for name in way:
-        node = next((value for key, value in _entries(node) if _text(key) == name), None)
+        node = node.get(name) if isinstance(node, Mapping) else None
     return node

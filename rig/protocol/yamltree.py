@@ -1,8 +1,8 @@
 """YAML parser that returns a tree whose nodes have line and column.
 
-The tree is built from the parser's events, not by its loader. So no tag can create an object,
-scalars remain text, repeated keys can be reported, and depth and size are bounded: no file can
-exhaust stack or memory.
+The tree is made from PyYAML's nodes, not from its values. So no tag can create an object, scalars
+remain text, repeated keys can be reported, and depth and size are bounded: no file can exhaust
+stack or memory.
 """
 
 from __future__ import annotations
@@ -10,7 +10,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from itertools import count
+from typing import Any, NamedTuple, cast
 
 import yaml
 
@@ -37,8 +39,7 @@ _CORE = (
 )
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Place:
+class Place(NamedTuple):
     """Line and column, counted from 1."""
 
     line: int
@@ -78,10 +79,14 @@ class Sequence:
 
 @dataclass(slots=True)
 class Mapping:
-    """A mapping; entries in file order, repeated keys included."""
+    """A mapping; entries in file order, repeated keys included.
+
+    `partial` if further keys are not known: those that a chain takes over from a faulty one.
+    """
 
     place: Place
     entries: list[tuple[Node, Node]]
+    partial: bool = False
 
     def get(self, name: str | int) -> Node | None:
         """Return the first value of a key."""
@@ -130,7 +135,7 @@ def load(text: str, source: str) -> Node:
     """
     body = "\n".join(_BREAK.split(text.removeprefix("\ufeff")))
     try:
-        return _Builder(body).build()
+        return _compose(body)
     except _RefusalError as refusal:
         index, message = refusal.args
     except yaml.reader.ReaderError as error:
@@ -140,12 +145,12 @@ def load(text: str, source: str) -> Node:
         from rig.protocol.yamlmend import explain  # noqa: PLC0415 - only a mistake needs it
 
         index, message = explain(body, error)
-    except (yaml.YAMLError, ValueError, ArithmeticError, LookupError):
+    except (yaml.YAMLError, ValueError, ArithmeticError, LookupError, RecursionError):
         # The parser leaks int() and chr() errors of broken escapes and directives.
-        index, message = 0, "this file cannot be read; see its quotes and % lines"
+        index, message = 0, "this file cannot be read; see its quotes, brackets and % lines"
     place = place_at(body, index)
     below = _excerpt(body, place)
-    raise InputError(problems=[Problem(source, place.line, place.column, "", message, below)])
+    raise InputError(problems=[Problem(source, *place, "", message, below)])
 
 
 class _RefusalError(Exception):
@@ -167,62 +172,44 @@ def _excerpt(text: str, place: Place) -> str:
     return f"\n    {one_line(line, _EXCERPT).rstrip()}\n    {'^':>{place.column - begin}}"
 
 
-class _Builder:
-    """Builds the tree from parser events, no deeper than `MAX_DEPTH` levels."""
+class _Composer(yaml.BaseLoader):
+    """PyYAML's composer of nodes, which have a tag only where the file has one."""
 
-    def __init__(self, text: str) -> None:
-        if tab := _TAB.search(text):
-            raise _RefusalError(tab.end() - 1, "a tab; use blanks")
-        self.events: Iterator[Any] = yaml.parse(text, Loader=yaml.SafeLoader)
-        self.anchors: dict[str, tuple[Node, int]] = {}
-        self.nodes = 0
+    def resolve(self, *_: object) -> None:
+        """Leave the type of a node to its reader."""
 
-    def build(self) -> Node:
-        documents = self._list(yaml.StreamEndEvent, -1)
-        if not documents:
-            raise _RefusalError(0, "the file is empty; begin with protocol: 1")
-        return documents[0]
+    def compose_node(self, *place: Any) -> Any:
+        """Compose a node; an anchor may be given again (YAML 1.2, 3.2.2.2)."""
+        if not self.check_event(yaml.AliasEvent):
+            self.anchors.pop(cast("Any", self).peek_event().anchor, None)
+        return super().compose_node(*place)
 
-    def _list(self, end: type[Any], depth: int) -> list[Node]:
-        """Return the nodes up to the event that closes them."""
-        nodes: list[Node] = []
-        for event in self.events:
-            at = event.start_mark.index
-            if isinstance(event, end):
-                break
-            if isinstance(event, yaml.DocumentStartEvent) and nodes:
-                raise _RefusalError(at, "a second document; a file has one protocol")
-            if isinstance(event, yaml.NodeEvent):
-                nodes.append(self._node(event, depth + 1))
-        return nodes
 
-    def _node(self, event: Any, depth: int) -> Node:
-        node: Node
-        at, before, size = event.start_mark.index, self.nodes, 1
-        place = Place(event.start_mark.line + 1, event.start_mark.column + 1)
-        if isinstance(event, yaml.AliasEvent):
-            if event.anchor not in self.anchors:
-                name = quote(str(event.anchor))
-                raise _RefusalError(at, f"no anchor stands before the alias {name}")
-            node, size = self.anchors[event.anchor]
-        elif event.tag is not None:
-            raise _RefusalError(at, f"the tag {quote(event.tag)} is not accepted; leave it out")
-        elif isinstance(event, yaml.ScalarEvent):
-            # "\uD800" in double quotes is a lone surrogate, which no file or database accepts.
-            if any("\ud800" <= character <= "\udfff" for character in event.value):
-                raise _RefusalError(at, "half of a surrogate pair; write the character itself")
-            node = ScalarNode(event.value, event.style is None, place)
-        elif depth >= MAX_DEPTH:
-            raise _RefusalError(at, f"more than {MAX_DEPTH} levels of brackets or indents")
-        elif isinstance(event, yaml.SequenceStartEvent):
-            node = Sequence(place, self._list(yaml.SequenceEndEvent, depth))
-        else:
-            parts = self._list(yaml.MappingEndEvent, depth)
-            node = Mapping(place, list(zip(parts[::2], parts[1::2], strict=True)))
-        # Items of a list were counted when read; those of an alias are counted here.
-        self.nodes += size
-        if self.nodes > MAX_NODES:
-            raise _RefusalError(at, f"more than {MAX_NODES} values, aliases expanded")
-        if event.anchor:
-            self.anchors[event.anchor] = node, self.nodes - before
-        return node
+def _compose(text: str) -> Node:
+    """Return the tree of a text with plain line breaks."""
+    if tab := _TAB.search(text):
+        raise _RefusalError(tab.end() - 1, "a tab; use blanks")
+    root = yaml.compose(text, Loader=_Composer)
+    if root is None:
+        raise _RefusalError(0, "the file is empty; begin with protocol: 1")
+    return _translate(root, count(1), 0)
+
+
+def _translate(node: Any, numbers: Iterator[int], depth: int) -> Node:
+    """Return the tree below a node; `numbers` counts its nodes, those of an alias again."""
+    at, place = node.start_mark.index, Place(node.start_mark.line + 1, node.start_mark.column + 1)
+    if next(numbers) > MAX_NODES:
+        raise _RefusalError(at, f"more than {MAX_NODES} values, aliases expanded")
+    if node.tag is not None:
+        raise _RefusalError(at, f"the tag {quote(node.tag)} is not accepted; leave it out")
+    if isinstance(node, yaml.ScalarNode):
+        # "\uD800" in double quotes is a lone surrogate, which no file or database accepts.
+        if any("\ud800" <= character <= "\udfff" for character in node.value):
+            raise _RefusalError(at, "half of a surrogate pair; write the character itself")
+        return ScalarNode(node.value, node.style is None, place)
+    if depth >= MAX_DEPTH:  # or an alias of what is around it
+        raise _RefusalError(at, f"more than {MAX_DEPTH} levels of brackets or indents")
+    inner = partial(_translate, numbers=numbers, depth=depth + 1)
+    if isinstance(node, yaml.SequenceNode):
+        return Sequence(place, [*map(inner, node.value)])
+    return Mapping(place, [(inner(key), inner(value)) for key, value in node.value])

@@ -14,11 +14,10 @@ from rig.errors import InputError
 from rig.model.batch import Floats
 from rig.model.chain import Chain
 from rig.model.surface import Pile
-from rig.protocol.fields import did_you_mean
 from rig.protocol.protocol import Protocol
 from rig.reasons import rig_error
 from rig.sweep.variables import VARIABLES, scene_values
-from rig.units import UnitError, parse, quote
+from rig.units import UnitError, did_you_mean, parse, quote
 
 MOST_POINTS = 20_000_000
 """Their results take 17 bytes each, all in memory until the file is written."""

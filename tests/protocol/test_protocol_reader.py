@@ -26,6 +26,7 @@ def problems(text):
 def test_yaml_1_2_scalars():
     protocol = parse(GOOD)
     assert protocol.title == "on"
+    assert parse(GOOD.replace("title: on", "title: &x on\nnotes: &x later")).notes == "later"
     changed = GOOD.replace("0.50 ± 0.05", "1e-3").replace("repeats: 4", "repeats: 0o17")
     protocol = parse(changed)
     assert protocol.surface.restitution.value == 1e-3
