@@ -50,7 +50,7 @@ def _read_scatter(path: str, protocol: Protocol) -> Components:
     from rig.session.store import Session  # noqa: PLC0415
 
     with Session.open(path, readonly=True) as session:
-        if (protocol_of(session).surface is None) != (protocol.surface is None):
+        if bool(protocol_of(session).surface) != bool(protocol.surface):
             raise rig_error("scatter_unlike", path=path, protocol=protocol.title)
         joint = complete_analysis(session).joint
     if joint is None:
