@@ -30,7 +30,7 @@ def main(arguments: Arguments) -> None:
     limits = room(protocol, arguments.lowest, arguments.highest, arguments.spacing)
     if limits.lowest > limits.highest:
         raise rig_error("beams_reversed")
-    layouts: dict[str, Any] = {
+    layouts = {
         "runs": len(runs(protocol)),
         "scatter": "learned" if learned else "stated",
         "current": _forecast(protocol, components),
