@@ -32,9 +32,8 @@ class Air(NamedTuple):
         return [drag / mass for drag, mass in zip(self.drags, self.masses, strict=True)]
 
     def on_legs(self) -> list[float]:
-        """κ of what falls on the leg before each impact, 1/m; empty in vacuum."""
-        legs = range(len(self.masses)) if any(self.drags) else ()
-        return [sum(self.drags[k:]) / sum(self.masses[k:]) for k in legs]
+        """κ of what falls on the leg before each impact, 1/m."""
+        return [sum(self.drags[k:]) / sum(self.masses[k:]) for k in range(len(self.masses))]
 
 
 def air(protocol: Protocol, drag: float) -> dict[str, Air]:

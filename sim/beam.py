@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
@@ -24,8 +23,7 @@ class Shadow(NamedTuple):
     rod: int
 
 
-@dataclass(frozen=True, slots=True)
-class SeenEdge:
+class SeenEdge(NamedTuple):
     """An edge as the receiver reports it, with the hidden truth of its origin."""
 
     time_s: float
@@ -39,11 +37,9 @@ def union(shadows: Iterable[Shadow]) -> list[tuple[Shadow, int]]:
     merged: list[tuple[Shadow, int]] = []
     for shadow in sorted(shadows):
         if merged and shadow.start <= merged[-1][0].end:
-            last, end_rod = merged[-1]
+            last, _ = merged[-1]
             if shadow.end > last.end:
                 merged[-1] = (Shadow(last.start, shadow.end, last.rod), shadow.rod)
-            else:
-                merged[-1] = (last, end_rod)
         else:
             merged.append((shadow, shadow.rod))
     return merged

@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import random
 from collections import deque
+from operator import itemgetter
 from typing import TYPE_CHECKING
 
 from rig.link import messages as wire
@@ -222,27 +223,29 @@ class VirtualBoard:
         """Find what happens next. Sending is polled: meanwhile only interrupts happen."""
         if self._boot_ns is not None:
             return self._boot_ns, self._boot
-        state, inputs, polled = self._controller, self._inputs, self.line.free_ns
-        upcoming: list[tuple[int, Callable[[], None]]] = []
-        if inputs.stop_turns_ns is not None:
-            upcoming.append((inputs.stop_turns_ns, self._stop_turns))
-        if inputs.pulses_ns:
-            upcoming.append((inputs.pulses_ns[0], self._reference_pulse))
-        if state.coming:
-            upcoming.append((state.coming[0].when_ns, self._gate_changes))
-        if state.sense_ns is not None:
-            upcoming.append((state.sense_ns, self._sense))
-        if state.end_ns is not None:
-            upcoming.append((max(state.end_ns, polled), self._close))
-            if state.drop is not None and state.drop.unsent:
-                full = state.drop.unsent >= _BATCH
-                due_ns = self._now_ns if full else self._oldest_ns + _OLDEST_NS
-                upcoming.append((max(due_ns, polled), self._stream))
-        if state.order is not None:
-            upcoming.append((max(state.lapses_ns, polled), self._lapse))
-        if self._inbox:
-            upcoming.append((max(self._inbox[0][0] + _EXECUTION_NS, polled), self._listen))
-        return min(upcoming, key=lambda item: item[0]) if upcoming else None
+        state, inputs = self._controller, self._inputs
+        interrupts = (
+            (inputs.stop_turns_ns, self._stop_turns),
+            (inputs.pulses_ns[0] if inputs.pulses_ns else None, self._reference_pulse),
+            (state.coming[0].when_ns if state.coming else None, self._gate_changes),
+            (state.sense_ns, self._sense),
+        )
+        polled = (
+            (state.end_ns, self._close),
+            (self._stream_ns(), self._stream),
+            (state.lapses_ns if state.order is not None else None, self._lapse),
+            (self._inbox[0][0] + _EXECUTION_NS if self._inbox else None, self._listen),
+        )
+        upcoming = [(when_ns, act) for when_ns, act in interrupts if when_ns is not None]
+        upcoming += [(max(at, self.line.free_ns), act) for at, act in polled if at is not None]
+        return min(upcoming, key=itemgetter(0), default=None)
+
+    def _stream_ns(self) -> int | None:
+        """While recording: when events are sent, at once if they fill a frame."""
+        drop = self._controller.drop
+        if self._controller.end_ns is None or drop is None or not drop.unsent:
+            return None
+        return self._now_ns if drop.unsent >= _BATCH else self._oldest_ns + _OLDEST_NS
 
     def _boot(self) -> None:
         self._boot_ns = None

@@ -51,14 +51,21 @@ class Hung:
 
     Attributes
     ----------
+    run, label
+        Which drop.
     release_s, skew_s
-        When the first chain leaves after fire, and how much later the free one does.
+        When the first chain leaves after fire, and how much later the free one does, s.
+    bodies
+        The chain on each side that has one.
     hang
         How much too high the impact chain and the free one hang, m.
     rng
         For all else.
     """
 
+    run: Run
+    label: int
+    bodies: dict[Side, Body]
     release_s: float
     skew_s: float
     hang: tuple[float, float]
@@ -99,6 +106,8 @@ class ChainLab:
         Chooses the rig, the chains and all drops.
     tell
         Called with the hidden truth of each drop.
+    setting
+        Which setting of a plan this is, but for the first: chains hang wrongly by another error.
 
     Attributes
     ----------
@@ -123,10 +132,11 @@ class ChainLab:
         dials: Dials,
         seed: int,
         tell: Callable[[Truth], None] = lambda _: None,
+        *setting: str,
     ) -> None:
         check_released(protocol)
         scenes = [*protocol.settings.items()][1:]
-        self.others = {at: type(self)(scene, dials, seed, tell) for at, scene in scenes}
+        self.others = {at: type(self)(scene, dials, seed, tell, at) for at, scene in scenes}
         self.protocol = protocol
         self.seed = seed
         self.dials = dials = dials.on(protocol, self._share)
@@ -135,10 +145,10 @@ class ChainLab:
         self.runs = {run.number: run for run in runs(protocol)}
         self.made: dict[int, Falls] = {}
         self.gates = protocol.gates.gates
-        self.hang_height = self._hang_height()
-        for setting, other in self.others.items():
+        for other in self.others.values():
             other.runs, other.made = self.runs, self.made
-            other.hang_height = other._hang_height(setting)
+        drop, error = protocol.drop, float(self._rng("rig", *setting).normal())
+        self.hang_height = drop.value + drop.u * dials.drop_error * error
         self.surface = self._surface()
         self.side = dials.side_sd * float(self._rng("side").normal())
         self.air = air(protocol, dials.drag)
@@ -177,11 +187,6 @@ class ChainLab:
             pile,
         )
 
-    def _hang_height(self, *setting: str) -> float:
-        """Draw the height at which chains hang: each setting of a plan has an error of its own."""
-        drop, error = self.protocol.drop, self._rng("rig", *setting).normal()
-        return drop.value + drop.u * self.dials.drop_error * float(error)
-
     def _level(self, run: Run) -> float:
         """How far above the zero of all heights the chain strikes, m."""
         if run.impact is None:
@@ -197,10 +202,10 @@ class ChainLab:
         digest = hashlib.sha256(repr((self.seed, *subject)).encode()).digest()
         return np.random.default_rng(int.from_bytes(digest[:16], "little"))
 
-    def _drop_rng(self, subject: str, run: Run, attempt: int, *side: Side) -> np.random.Generator:
+    def _drop_rng(self, subject: str, label: int, *side: Side) -> np.random.Generator:
         """Give what is drawn anew in each drop a stream of its own."""
         series = (self.series,) if self.series else ()
-        return self._rng(subject, *side, run.number, attempt, *series)
+        return self._rng(subject, *side, *unpack_label(label), *series)
 
     def _body(self, spec: RodChain) -> Body:
         rng = self._rng("chain", spec.name)
@@ -211,25 +216,25 @@ class ChainLab:
             np.array(spec.widths) + or_stated(self.dials.width_sd, spec.width_u) * rng.normal(),
         )
 
-    def _run(self, label: int) -> tuple[Run, int]:
-        number, attempt = unpack_label(label)
+    def _run(self, label: int) -> Run:
+        number, _ = unpack_label(label)
         if number not in self.runs:
             raise InputError(
                 f"the simulated scene's plan has no run {number}",
                 "give sim:// the protocol that is being run",
             )
-        return self.runs[number], attempt
+        return self.runs[number]
 
     def _lab(self, label: int) -> ChainLab:
         """Return the rig in the setting of a drop's run."""
-        return self.others.get(self._run(label)[0].setting, self)
+        return self.others.get(self._run(label).setting, self)
 
     def rest(self, label: int) -> int:
         """Mask of the beams that the hanging chains block."""
         if is_test(label):
             return 0
         lab = self._lab(label)
-        mask, hanging = 0, lab.hanging(self._run(label)[0])
+        mask, hanging = 0, lab.hanging(self._run(label))
         for gate in lab.gates:
             if (body := hanging.get(gate.side)) is not None:
                 middles = lab.hang_height + body.offsets + lab._shift(body, gate)
@@ -248,9 +253,9 @@ class ChainLab:
             return []
         if (lab := self._lab(label)) is not self:
             return lab.drop(label)
-        run, attempt = self._run(label)
-        hung, dials = self._hung(run, attempt), self.dials
-        falls, rng = self._fall(run, attempt, hung), hung.rng
+        number, attempt = unpack_label(label)
+        hung, dials = self._hung(label), self.dials
+        falls, rng = self._fall(hung), hung.rng
         lowest = min((gate.height for gate in self.gates if gate.side == "impact"), default=0.0)
         edges: list[SeenEdge] = []
         for gate in self.gates:
@@ -264,75 +269,71 @@ class ChainLab:
         edges.sort(key=lambda edge: edge.time_s)
         self.tell(
             self.truth_kind(
-                run=run.number,
+                run=number,
                 attempt=attempt,
-                incline_deg=run.incline_deg,
-                impact_chain=run.impact,
+                incline_deg=hung.run.incline_deg,
+                impact_chain=hung.run.impact,
                 gravity_m_s2=self.protocol.gravity.value,
-                edges=[(edge.time_s, edge.channel, edge.blocked, edge.rod) for edge in edges],
+                edges=edges,
                 **falls.truth,
             )
         )
-        return [(edge.time_s, edge.channel, edge.blocked) for edge in edges]
+        return [edge[:-1] for edge in edges]
 
-    def _hung(self, run: Run, attempt: int) -> Hung:
-        rng = self._drop_rng("drop", run, attempt)
-        dials = self.dials
+    def _hung(self, label: int) -> Hung:
+        run, dials, rng = self._run(label), self.dials, self._drop_rng("drop", label)
         release = dials.delay + dials.delay_sd * float(rng.normal())
         skew = dials.skew_sd * float(rng.normal())
         # A chain that falls alone has nothing to be late against.
         late = skew if run.impact is not None else 0.0
-        hang = dials.hang_sd * rng.normal(size=2)
-        return Hung(release, late, (float(hang[0]), float(hang[1]) + self.side), rng)
+        impact, free = (dials.hang_sd * rng.normal(size=2)).tolist()
+        hang = impact, free + self.side
+        return Hung(run, label, self.hanging(run), release, late, hang, rng)
 
     def make_ahead(self, labels: Sequence[int]) -> None:
         """Make drops before they are asked for: these need no time worth saving."""
 
-    def _fall(self, run: Run, attempt: int, hung: Hung) -> Falls:
+    def _fall(self, hung: Hung) -> Falls:
         """Let the chains of a drop fall, by the model."""
-        level = self._level(run)
-        start, hanging = self.hang_height - level, self.hanging(run)
+        level = self._level(hung.run)
+        start = self.hang_height - level
         paths: dict[Side, Path] = {}
-        for side, body in hanging.items():
+        for side, body in hung.bodies.items():
             if side == "impact":
-                paths[side] = self._impact_path(
-                    body, run, hung.release_s, start + hung.hang[0], hung.rng
-                )
+                paths[side] = self._impact_path(body, start + hung.hang[0], hung)
             else:
                 kappas = self.air[body.spec.name].on_legs()[:1]
                 let_go_s, gravity = hung.release_s + hung.skew_s, self.protocol.gravity.value
                 paths[side] = Path(let_go_s, start + hung.hang[1], gravity, kappas=kappas)
         shadows = {
-            gate.channel: self._shadows(gate, level, hanging[gate.side], paths[gate.side])
+            gate.channel: self._shadows(gate, level, hung.bodies[gate.side], paths[gate.side])
             for gate in self.gates
             if gate.side in paths
         }
         if "impact" not in paths:
             return Falls(shadows, {})
         strikes = [hung.release_s + hit.time_s for hit in paths["impact"].hits]
-        return Falls(shadows, self._truth(run, attempt, paths), strikes)
+        return Falls(shadows, self._truth(hung, paths), strikes)
 
-    def _impact_path(
-        self, body: Body, run: Run, release: float, start: float, rng: np.random.Generator
-    ) -> Path:
+    def _impact_path(self, body: Body, start: float, hung: Hung) -> Path:
         """Compute the fall of the impact chain by the model, with its own rods and impulses."""
         assert self.surface is not None
-        dials, chain, incline = self.dials, body.spec.chain, run.incline_deg
+        dials, chain, incline = self.dials, body.spec.chain, hung.run.incline_deg
         impact = impact_on(self.surface, chain, incline)
         alpha = impact.alpha
         if chain.alpha is not None:
             alpha += dials.impact_error * chain.alpha.u * self._rng("alpha").normal()
-        alphas = alpha * (1.0 + dials.impulse_sd * rng.normal(size=chain.rods))
+        alphas = alpha * (1.0 + dials.impulse_sd * hung.rng.normal(size=chain.rods))
         # What touches the board higher hangs as much lower, as far as its strike goes.
         strikes = body.offsets - np.array(higher_contacts(self.protocol, incline, body.spec))
-        strikes[:-1] -= self._contact(run)  # the last one is judged at the level
+        strikes[:-1] -= self._contact(hung.run)  # the last one is judged at the level
         bottom = float(strikes[0])
         actual = Chain(chain.masses, tuple((strikes - bottom).tolist()), chain.inertia)
         gains = kicks(actual, alphas.tolist(), impact.gamma)
         gravity = self.protocol.gravity.value
         air = self.air[body.spec.name].on_legs()
         events = hits(actual, gains, start + bottom, gravity, leg=air_legs(air))
-        return Path(release, start, gravity, events, tuple((-strikes).tolist()), air)
+        return Path(hung.release_s, start, gravity, events, tuple((-strikes).tolist()), air)
 
     def _contact(self, run: Run) -> float:
         """How far above the contact level rods touch, m."""
@@ -358,13 +359,13 @@ class ChainLab:
             if path.start + middle >= height  # else it hangs below the beam
         ]
 
-    def _truth(self, run: Run, attempt: int, paths: dict[Side, Path]) -> dict[str, Any]:
+    def _truth(self, hung: Hung, paths: dict[Side, Path]) -> dict[str, Any]:
         """Return what really happened, for the judge of the analysis alone."""
-        path, dials, hanging = paths["impact"], self.dials, self.hanging(run)
+        path = paths["impact"]
         hit = path.hits[-1]
         # The top rod falls on, from where it passes the level or not so far.
-        above = self.protocol.contact.strike.value + self._contact(run)
-        above += dials.strike_sd * float(self._drop_rng("strike", run, attempt).normal())
+        above = self.protocol.contact.strike.value + self._contact(hung.run)
+        above += self.dials.strike_sd * float(self._drop_rng("strike", hung.label).normal())
         late, speed_strike = path.last_at(above)
         truth = {
             "speed_m_s": hit.speed_before,
@@ -373,7 +374,7 @@ class ChainLab:
         }
         if "free" not in paths:
             return truth
-        free, top = paths["free"], float(hanging["free"].offsets[-1])
+        free, top = paths["free"], float(hung.bodies["free"].offsets[-1])
         skew, hit_s = free.release_s - path.release_s, path.release_s + hit.time_s
         return truth | {
             "release_skew_s": skew,

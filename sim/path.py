@@ -33,7 +33,7 @@ class Path:
         Height of the reference point at each impact, falling.
     kappas
         The air takes κv² from the acceleration, 1/m: before each hit, and after the last one what
-        it was before; empty without air.
+        it was before; 0 without air.
     """
 
     release_s: float
@@ -41,21 +41,15 @@ class Path:
     gravity: float
     hits: Sequence[Hit] = ()
     hit_heights: Sequence[float] = ()
-    kappas: Sequence[float] = ()
+    kappas: Sequence[float] = (0.0,)
 
     def time_at(self, height: float) -> float:
         """When the reference point comes down to `height`, s."""
         # hit_heights falls, so its negative rises and can be searched.
         done = bisect_left(self.hit_heights, -height, key=lambda z: -z)
-        begun, top, speed = self._leg(done)
-        time = self.release_s + begun
-        distance = top - height
-        if distance <= 0.0:
-            return time
-        if self.kappas:
-            return time + drag_leg(distance, speed, self.gravity, self._kappa(done))[1]
-        arrival = math.sqrt(speed * speed + 2.0 * self.gravity * distance)
-        return time + 2.0 * distance / (speed + arrival)
+        begun, top, speed, kappa = self._leg(done)
+        distance = max(0.0, top - height)
+        return self.release_s + begun + drag_leg(distance, speed, self.gravity, kappa)[1]
 
     def height_at(self, time_s: float) -> float:
         """Height of the reference point at a time, m."""
@@ -63,10 +57,10 @@ class Path:
         if since <= 0.0:
             return self.start
         done = bisect_left(self.hits, since, key=lambda hit: hit.time_s)
-        begun, top, speed = self._leg(done)
+        begun, top, speed, kappa = self._leg(done)
         since -= begun
-        if self.kappas:
-            return top - fallen(since, self.gravity, self._kappa(done), speed)
+        if kappa:
+            return top - fallen(since, self.gravity, kappa, speed)
         return top - (speed + 0.5 * self.gravity * since) * since
 
     def last_at(self, above: float) -> tuple[float, float]:
@@ -78,7 +72,7 @@ class Path:
             After the hit, s, so that it is negative above; m/s.
         """
         speed = self.hits[-1].speed_before
-        kappa = self._kappa(len(self.hits) - 1) if self.kappas else 0.0
+        *_, kappa = self._leg(len(self.hits) - 1)
         # g − κv² falls by e^(−2κd) on the way down d.
         pull = self.gravity - kappa * speed**2
         rise = math.expm1(2.0 * kappa * above) / kappa if kappa else 2.0 * above
@@ -87,12 +81,10 @@ class Path:
         _, late = drag_leg(abs(above), start, self.gravity, kappa)
         return math.copysign(late, -above), passing
 
-    def _leg(self, done: int) -> tuple[float, float, float]:
-        """After so many hits: when since the release, from where and how fast it falls on."""
+    def _leg(self, done: int) -> tuple[float, float, float, float]:
+        """After so many hits: when since the release, from where, how fast, at what κ it falls."""
+        kappa = self.kappas[min(done, len(self.kappas) - 1)]
         if not done:
-            return 0.0, self.start, 0.0
+            return 0.0, self.start, 0.0, kappa
         hit = self.hits[done - 1]
-        return hit.time_s, self.hit_heights[done - 1], hit.speed_after
-
-    def _kappa(self, done: int) -> float:
-        return self.kappas[min(done, len(self.kappas) - 1)]
+        return hit.time_s, self.hit_heights[done - 1], hit.speed_after, kappa

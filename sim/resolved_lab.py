@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rig.model.surface import Surface
-    from rig.protocol.protocol import RodChain, Run, Side
+    from rig.protocol.protocol import RodChain, Side
 
     from .dials import ResolvedDials
-    from .lab import Body, Hung
+    from .lab import Hung
     from .resolved.scene import Fall
 
 log = logging.getLogger(__name__)
@@ -86,20 +86,21 @@ class ResolvedLab(ChainLab):
 
     def make_ahead(self, labels: Sequence[int]) -> None:
         """Make drops on all processors, and wait for them."""
-        jobs = [(self._lab(label), *self._run(label)) for label in labels]
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            falls = pool.map(lambda job: job[0]._fall(*job[1:], job[0]._hung(*job[1:])), jobs)
-            self.made |= zip(labels, falls, strict=True)
 
-    def _fall(self, run: Run, attempt: int, hung: Hung) -> Falls:
+        def make(label: int) -> Falls:
+            lab = self._lab(label)
+            return lab._fall(lab._hung(label))
+
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            self.made |= zip(labels, pool.map(make, labels), strict=True)
+
+    def _fall(self, hung: Hung) -> Falls:
         """Let the chains of a drop fall, unless they already have."""
-        label = pack_label(run.number, attempt)
-        if label in self.made:
-            return self.made[label]
-        chains = self._hang_safely(label)
+        if hung.label in self.made:
+            return self.made[hung.label]
+        chains = self._hang_safely(hung.label)
         falls = {side: self.let_fall(chain) for side, chain in chains.items()}
-        truth = self._resolved_truth(run, attempt, hung, falls)
-        return Falls(self._resolved_shadows(run, attempt, hung, falls), truth)
+        return Falls(self._resolved_shadows(hung, falls), self._resolved_truth(hung, falls))
 
     def _hang_safely(self, label: int) -> dict[Side, Chain]:
         """Hang the chains of a drop, and see that they can fall.
@@ -125,12 +126,8 @@ class ResolvedLab(ChainLab):
 
     def chains(self, label: int) -> dict[Side, Chain]:
         """Hang the chains of a drop as they really are."""
-        run, attempt = self._run(label)
-        hang, level = self._hung(run, attempt).hang, self._level(run)
-        return {
-            side: self._hang(side, body, run, attempt, hang[side == "free"] - level)
-            for side, body in self.hanging(run).items()
-        }
+        hung = self._hung(label)
+        return {side: self._hang(side, hung) for side in hung.bodies}
 
     def _nominal(self, spec: RodChain) -> Rods:
         diameters = np.array(spec.diameters)
@@ -143,11 +140,11 @@ class ResolvedLab(ChainLab):
         places = np.array(spec.chain.heights), diameters, tilts, zero, zero
         return Rods(masses, *places, length, self.dials.roll > 0.0, spec.chain.inertia / XI)
 
-    def _hang(self, side: Side, body: Body, run: Run, attempt: int, too_high: float) -> Chain:
+    def _hang(self, side: Side, hung: Hung) -> Chain:
         """Hang a chain with its rods as they are, and as they hang this time."""
-        dials, surface, nominal = self.dials, self.surface, self._nominal(body.spec)
-        own = self._rng("tilts", body.spec.name)
-        draws = self._drop_rng("hung", run, attempt, side)
+        dials, surface, body = self.dials, self.surface, hung.bodies[side]
+        nominal, own = self._nominal(body.spec), self._rng("tilts", body.spec.name)
+        draws = self._drop_rng("hung", hung.label, side)
         count = nominal.masses.size
         rods = replace(
             nominal,
@@ -163,27 +160,26 @@ class ResolvedLab(ChainLab):
             # Where nothing is struck a fence may hang: it is stiff, strings do not turn it.
             swing = np.zeros_like(swing)
         elif side == "impact":
-            board = Board(math.radians(run.incline_deg), _bounce(surface, dials))
+            board = Board(math.radians(hung.run.incline_deg), _bounce(surface, dials))
             if dials.rods_touch > 0.0:
                 touching = Bounce(dials.rod_restitution, dials.rod_time, dials.rod_friction)
         strings = Strings(dials.string_restitution, dials.string_strain)
+        too_high = hung.hang[side == "free"] - self._level(hung.run)
         start, gravity = self.hang_height + too_high, self.protocol.gravity.value
         drag = np.array(self.air[body.spec.name].on_rods())
         spin = dials.spin_sd * float(draws.normal())
         return Chain(rods, strings, start, gravity, board, touching, drag, swing, spin)
 
-    def _resolved_shadows(
-        self, run: Run, attempt: int, hung: Hung, falls: dict[Side, Fall]
-    ) -> dict[int, list[Shadow]]:
+    def _resolved_shadows(self, hung: Hung, falls: dict[Side, Fall]) -> dict[int, list[Shadow]]:
         """Return what darkens each beam."""
-        aside = self._drop_rng("centre", run, attempt).normal(size=2) * self.dials.off_centre_sd
+        aside = self._drop_rng("centre", hung.label).normal(size=2) * self.dials.off_centre_sd
         seen: dict[int, list[Shadow]] = {}
         for gate in (gate for gate in self.gates if gate.side in falls):
-            is_free, body = gate.side == "free", self.hanging(run)[gate.side]
+            is_free, body = gate.side == "free", hung.bodies[gate.side]
             let_go = hung.release_s + (hung.skew_s if is_free else 0.0)
             seen_by = shadows(
                 falls[gate.side],
-                self.heights[gate.channel] - self._level(run),
+                self.heights[gate.channel] - self._level(hung.run),
                 self.beams[gate.channel] + float(aside[int(is_free)]),
                 np.array(body.spec.diameters) * body.widths / np.array(body.spec.widths),
                 0.5 * self._nominal(body.spec).length,
@@ -193,9 +189,7 @@ class ResolvedLab(ChainLab):
             ]
         return seen
 
-    def _resolved_truth(
-        self, run: Run, attempt: int, hung: Hung, falls: dict[Side, Fall]
-    ) -> dict[str, Any]:
+    def _resolved_truth(self, hung: Hung, falls: dict[Side, Fall]) -> dict[str, Any]:
         if "impact" not in falls:
             return {}
         struck, skew = falls["impact"], hung.skew_s
@@ -224,7 +218,7 @@ class ResolvedLab(ChainLab):
                 lambda t: top_at(struck, t),
                 lambda t: top_at(free, t - skew),
                 struck.strike_s,
-                self._drop_rng("camera", run, attempt),
+                self._drop_rng("camera", hung.label),
             )
         return truth | {"track": {name: values.tolist() for name, values in track.items()}}
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from pathlib import Path
 
 
@@ -25,7 +26,7 @@ class Truth:
     incline_deg: float
     impact_chain: str | None
     gravity_m_s2: float
-    edges: list[tuple[float, int, bool, int]] = field(default_factory=list)
+    edges: Sequence[tuple[float, int, bool, int]] = ()
     separation_m: float | None = None
     separation_raw_m: float | None = None
     separation_strike_m: float | None = None

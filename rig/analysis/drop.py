@@ -29,6 +29,9 @@ from rig.reasons import make_reason
 from rig.records import Drop
 from rig.threads import one_thread
 
+Readings = dict[tuple[int, ...], DropIdentity]
+"""Identifications of a drop's edges, by the numbers of the gates left out."""
+
 
 @dataclass(frozen=True, slots=True)
 class DropSummary:
@@ -130,7 +133,7 @@ class DropCase:
 
     @one_thread
     def read(
-        self, readings: dict[tuple[int, ...], DropIdentity] | None = None, *, explain: bool = True
+        self, readings: Readings | None = None, *, explain: bool = True
     ) -> tuple[DropResult, Fit | None]:
         """Return the drop's result and fit; low gates that not all rods pass may be left out.
 
@@ -171,7 +174,7 @@ class DropCase:
     def _model(self, alpha: float) -> DropModel:
         return DropModel.of(self.protocol, self.records, self.scale.u, alpha)
 
-    def _identify(self, readings: dict[tuple[int, ...], DropIdentity]) -> DropIdentity:
+    def _identify(self, readings: Readings) -> DropIdentity:
         """Return the identification without the gates `aside`, at a rounded time scale."""
         rough, reading = replace(self, scale=self.scale.coarse()), readings.get(self.aside)
         if reading is None or reading.scale != rough.scale:
@@ -183,9 +186,7 @@ class DropCase:
             readings[self.aside] = reading
         return reading
 
-    def _fit(
-        self, readings: dict[tuple[int, ...], DropIdentity]
-    ) -> tuple[DropIdentity, Fit | None]:
+    def _fit(self, readings: Readings) -> tuple[DropIdentity, Fit | None]:
         """Return the identification of the drop, and its fit if the edges match a fall."""
         reading = self._identify(readings)
         begun = reading.begun
@@ -202,7 +203,7 @@ class DropCase:
         self,
         reading: DropIdentity,
         fit: Fit | None,
-        readings: dict[tuple[int, ...], DropIdentity],
+        readings: Readings,
         *,
         explain: bool,
     ) -> tuple[DropResult, Fit | None]:

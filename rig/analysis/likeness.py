@@ -54,8 +54,7 @@ class Likeness(NamedTuple):
 
     def json(self) -> dict[str, Any]:
         """Return ``{"like_model", "departure_m", "impulses", "sentence"}``."""
-        fields = {"like_model": self.like, "departure_m": self.departure}
-        return fields | attributes(self, "impulses", "sentence")
+        return attributes(self, "like_model=like", "departure_m=departure", "impulses", "sentence")
 
 
 def likeness(joint: JointFit) -> Likeness | None:

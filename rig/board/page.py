@@ -91,7 +91,7 @@ class BoardPage:
 
 def _draw_parts(view: SessionView) -> dict[str, Any]:
     """Return words and pictures of the latest drop, and of all."""
-    chart = result_figure(view.analysis, view.curves, site_m_s2=view.protocol.gravity.value)
+    chart = result_figure(view.analysis, view.curves)
     parts: dict[str, Any] = {"figure": chart and _svg(chart)}
     run, recorded = view.plan[min(view.plan)], None
     for job in view.jobs[-1:]:

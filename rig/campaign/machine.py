@@ -415,11 +415,10 @@ def _tick(flow: Flow, seconds: float) -> Outcome:
 def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Outcome:
     if flow.stage is Stage.PREPARE and job is not None:
         return replace(flow, job=job).to(Stage.SETTLING), (Wait(settle_s),)
-    if flow.stage is Stage.RESULT and not flow.logged:
-        return flow, ()  # what comes next depends on it
     if flow.stage is Stage.HALTED and flow.job is not None:
         return _onward(flow, Job(flow.job.run, flow.job.attempt + 1))
-    if flow.stage in {Stage.DEVICE, Stage.RESULT, Stage.DONE}:
+    # What comes after a result depends on it: it is logged first.
+    if flow.stage in {Stage.DEVICE, Stage.DONE} or (flow.stage is Stage.RESULT and flow.logged):
         return _onward(flow, job)
     return flow, ()
 

@@ -150,11 +150,9 @@ def margin(protocol: Protocol) -> float:
     The least over the outermost inclines, with chains hung higher or lower than stated and every
     edge seen where it should be; no more than `MARGIN`.
     """
-    cases = {(run.incline_deg, run.setting): run for run in reversed(runs(protocol))}
-    least, inclines = MARGIN, [incline for incline, _ in cases]
-    for run in cases.values():
-        if min(inclines) < run.incline_deg < max(inclines):
-            continue
+    least, inclines = MARGIN, protocol.plan.inclines
+    ends = [run for run in runs(protocol) if run.incline_deg in {min(inclines), max(inclines)}]
+    for run in {(run.incline_deg, run.setting): run for run in reversed(ends)}.values():
         here = of_run(protocol, run)
         model, x = predict_drop(here, run, priors(here))
         for off in (-_OFF, _OFF):

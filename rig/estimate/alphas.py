@@ -33,8 +33,7 @@ class ConditionAlpha(NamedTuple):
 
     def json(self) -> dict[str, Any]:
         """One of ``inclines``."""
-        record = self.condition.json() | attributes(self, "n", "alpha")
-        return record if self.model is None else record | {"model": self.model}
+        return attributes(self, "*condition", "n", "alpha", "model?")
 
 
 class RunAlpha(NamedTuple):
@@ -49,11 +48,15 @@ class RunAlpha(NamedTuple):
         """Less that of the model, in standard uncertainties."""
         return None if self.model is None else (self.alpha.value - self.model) / self.alpha.u
 
+    @property
+    def normalized_error(self) -> float | None:
+        """The same in expanded uncertainties."""
+        return None if self.residual is None else self.residual / 2.0
+
     def json(self) -> dict[str, Any]:
         """One of ``runs``."""
-        record: dict[str, Any] = {"run": self.run.number, "incline_deg": self.run.incline_deg}
-        record |= {"impact_chain": self.run.impact, "alpha": self.alpha.json()}
-        return record if self.residual is None else record | {"residual": self.residual}
+        run = "run=run.number", "incline_deg=run.incline_deg", "impact_chain=run.impact"
+        return attributes(self, *run, "alpha", "residual?")
 
 
 class SingleAlphas(NamedTuple):

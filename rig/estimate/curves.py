@@ -70,9 +70,8 @@ class DropCurves(NamedTuple):
 
     def json(self) -> dict[str, Any]:
         """One of ``curves``."""
-        record: dict[str, Any] = {"run": self.run.number, "incline_deg": self.run.incline_deg}
-        record |= {"impact_chain": self.run.impact} | attributes(self, "height_m")
-        record |= self.squared_speed.json("speed2_m2_s2")
+        run = "run=run.number", "incline_deg=run.incline_deg", "impact_chain=run.impact"
+        record = attributes(self, *run, "height_m") | self.squared_speed.json("speed2_m2_s2")
         if self.separation is not None:
             record |= attributes(self, "time_s") | self.separation.json(SEPARATION.name)
         return record

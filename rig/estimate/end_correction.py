@@ -70,7 +70,7 @@ class EndCorrection(NamedTuple):
             "p_without": self.p["without"],
             "p_eq10": self.p["eq10"],
         }
-        return record | {"needed": self.is_needed} | attributes(self, "sentence")
+        return record | attributes(self, "needed=is_needed", "sentence")
 
 
 def end_correction(protocol: Protocol, problem: CoefficientProblem) -> EndCorrection | None:

@@ -13,7 +13,7 @@ from rig.arrays import Array
 from rig.estimate.hypotheses import one_alpha, open_alphas, with_nuisances
 from rig.estimate.hypothesis_fit import LikelihoodRatio, fit
 from rig.estimate.quadratic_forms import QuadraticForm
-from rig.plain_data import attributes, plain
+from rig.plain_data import attributes
 from rig.protocol.protocol import Condition, Protocol
 from rig.reasons import make_reason
 
@@ -51,8 +51,8 @@ class Gain(NamedTuple):
 
     def json(self) -> dict[str, Any]:
         """One of ``groups``."""
-        record = {"rods": [self.first, self.last], "gain_m_s": self.measured.json()}
-        return record | attributes(self, "eq9_m_s", "normalized_error")
+        gain = attributes(self, "gain_m_s=measured", "eq9_m_s", "normalized_error")
+        return {"rods": [self.first, self.last]} | gain
 
 
 class Impulses(NamedTuple):
@@ -83,9 +83,8 @@ class Impulses(NamedTuple):
 
     def json(self) -> dict[str, Any]:
         """One of ``inclines``."""
-        record: dict[str, Any] = {"rods": self.rods, "resolved": self.resolved}
-        record = self.condition.json() | record | attributes(self, "alpha")
-        return record | self.eq9.json() | {"groups": plain(self.gains)}
+        names = "*condition", "rods", "resolved", "alpha", "*eq9", "groups=gains"
+        return attributes(self, *names)
 
 
 def impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> tuple[Impulses, ...]:

@@ -145,8 +145,8 @@ class SessionEstimate:
             sentence = resolution(self.impulses)
             record["impulses"] = {"inclines": plain(self.impulses), "sentence": sentence}
         optional = ("left_out", "comparison", "curves")
-        record |= attributes(self, *(name for name in optional if getattr(self, name) is not None))
-        return record | (attributes(self, "failed") if self.failed else {})
+        known = (name for name in optional if getattr(self, name) is not None)
+        return record | attributes(self, *known, "failed?")
 
 
 @one_thread

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 
 from rig.boards import LONGEST_RECORD_MS
 from rig.errors import DeviceTimeoutError
@@ -68,12 +69,10 @@ class Device(Exchange):
         try:
             self.write(DELIMITER)  # ends whatever junk the line has seen so far
             self.wait_for(boot_wait_s, _is_boot)
-            with suppress(DeviceTimeoutError):
-                return self._identify()
-            self._leave_loader()
-            with suppress(DeviceTimeoutError):
-                return self._identify()
-            self.wait_for(LOADER_WAIT_S, _is_boot)
+            for wake in (self._leave_loader, partial(self.wait_for, LOADER_WAIT_S, _is_boot)):
+                with suppress(DeviceTimeoutError):
+                    return self._identify()
+                wake()
             return self._identify()
         finally:
             self.expect_boot = False

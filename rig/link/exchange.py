@@ -125,8 +125,7 @@ class Exchange:
         DeviceError
             It answered something else, restarted, or the connection broke.
         """
-        self._seq = self._seq % (_PAST_SEQ - 1) + 1
-        seq = self._seq
+        seq = self._seq = self._seq % (_PAST_SEQ - 1) + 1
         code, payload = wire.pack(message)
         data = encode(Frame(code, seq, 0, payload))
         self.requests += 1
@@ -187,8 +186,7 @@ class Exchange:
             lacking = (
                 "and no word of who is there" if self.transcript.rx.good else "that are no frames"
             )
-            size_mb = self.rx_bytes / 1e6
-            raise rig_error("bytes_strange", size_mb=size_mb, lacking=lacking)
+            raise rig_error("bytes_strange", size_mb=self.rx_bytes / 1e6, lacking=lacking)
         self._part += data
         # A line gives single bytes, and half a frame says nothing.
         ended = DELIMITER in data or len(self._part) > _NOISE

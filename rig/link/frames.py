@@ -184,12 +184,11 @@ class Decoder:
         """
         *complete, partial = (self._partial + data).split(DELIMITER)
         frames: list[Frame] = []
-        for stuffed in complete:
-            if stuffed:  # nothing between two delimiters is idle line, not a fault
-                try:
-                    frames.append(decode(stuffed))
-                except FrameError:
-                    self.bad += 1
+        for stuffed in filter(None, complete):  # nothing between two delimiters is idle line
+            try:
+                frames.append(decode(stuffed))
+            except FrameError:
+                self.bad += 1
         self.good += len(frames)
         self._partial = partial[:FRAME_LIMIT]  # as much as tells that the stretch is too long
         return frames

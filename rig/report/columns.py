@@ -13,7 +13,9 @@ from rig.report.numbers import degrees, fixed, plus_minus
 from rig.text_rows import read_paragraphs
 from rig.text_table import text_table
 
-_NOTHING: Mapping[str, Callable[[Any], Any]] = {}
+Derived = Mapping[str, Callable[[Any], Any]]
+"""Functions that a table calls with ``()``, by name."""
+_NOTHING: Derived = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +50,7 @@ def table_parts(
     name: str,
     records: Iterable[Any] = (),
     words: Iterable[str] = (),
-    derived: Mapping[str, Callable[[Any], Any]] = _NOTHING,
+    derived: Derived = _NOTHING,
     row: Measurand | None = None,
 ) -> Iterator[Part]:
     """Yield a table of ``columns.txt``, unless it is empty.
@@ -121,7 +123,7 @@ def _cell(
     place: str,
     way: str,
     row: Measurand | None,
-    derived: Mapping[str, Callable[[Any], Any]],
+    derived: Derived,
     record: Any,
 ) -> str:
     own = record.get if isinstance(record, Mapping) else partial(getattr, record)
@@ -131,9 +133,7 @@ def _cell(
     return _WAYS[way](value, row, *map(float, numbers))
 
 
-def value_at(
-    record: Any, place: str, derived: Mapping[str, Callable[[Any], Any]] = _NOTHING
-) -> Any:
+def value_at(record: Any, place: str, derived: Derived = _NOTHING) -> Any:
     """Return the value at a path such as ``run.incline_deg`` or ``0.edges()``; ``-`` is the record.
 
     `None` has no further parts. A mapping inside a record may lack a key; the record itself only if

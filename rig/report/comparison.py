@@ -83,12 +83,12 @@ def _tables(results: TogetherResults) -> Iterator[Part]:
     """Yield the tables of each measurand."""
     for row, differences in _differences(results):
         means = (
-            {"session": part.name, "line": mean.line, "runs": _runs(mean.line)}
+            {"session": part.name, "line": mean.line}
             for part in results.parts
             for mean in means_of(part.analysis.summary, row)
         )
-        yield from table_parts("sessions", means, row=row)
-        yield from table_parts("differences", differences, (), {"runs": _runs}, row)
+        for name, records in (("sessions", means), ("differences", differences)):
+            yield from table_parts(name, records, (), {"runs": _runs}, row)
 
 
 def _claims(results: TogetherResults) -> list[str]:

@@ -38,25 +38,21 @@ def estimate_pictures(found: SessionEstimate, sections: Sections) -> dict[str, C
 
 def _alpha(found: SessionEstimate) -> Chart | None:
     """Return the figure of α against incline, with every run's residual below."""
-    if found.alphas is None:
-        return None
-    runs, inclines = found.alphas.runs, found.alphas.inclines
-    left = [(run.run.incline_deg, run.residual / 2.0) for run in runs if run.residual is not None]
-    return chart("alpha", {"runs": runs, "inclines": inclines, "left": left})
+    return None if found.alphas is None else chart("alpha", found.alphas._asdict())
 
 
 def _impulses(found: SessionEstimate) -> Chart | None:
     """Return the figure of each rod's ΔV with Eq. 9, and the normalized errors of all inclines."""
     lines = found.impulses or ()
-    inclines = [{**style, "line": line, "gains": line.gains} for line, style in _style_lines(lines)]
+    inclines = [{**styled, "gains": styled["line"].gains} for styled in _style_lines(lines)]
     sources = {"inclines": inclines, "gains": [gain for line in lines for gain in line.gains]}
     return chart("impulses", sources) if lines else None
 
 
 def _curves(found: SessionEstimate) -> Chart | None:
     """Return the figure of Δz(t) and V²(z) with bands (Fig. 4)."""
-    drops = [{**style, "drop": drop} for drop, style in _style_lines(found.curves or ())]
-    apart = any(drop["drop"].separation for drop in drops)
+    drops = [*_style_lines(found.curves or ())]
+    apart = any(drop["line"].separation for drop in drops)
     return chart("curves" if apart else "speeds", {"drops": drops}) if drops else None
 
 
@@ -91,13 +87,13 @@ def _regions(mixture: Posterior) -> Trace | None:
     return Trace("", nodes.tolist(), grid.tolist(), "levels", MODEL, _SHARES, z=held.tolist())
 
 
-def _style_lines(lines: Sequence[Any]) -> Iterator[tuple[Any, dict[str, str]]]:
+def _style_lines(lines: Sequence[Any]) -> Iterator[dict[str, Any]]:
     """Yield at most three items, the outermost and one between, each with its own style."""
     number = len(lines)
     if number > len(_STYLES):
         lines = [lines[n] for n in (number // 3, number * 2 // 3, number - 1)]
     for line, (role, color) in zip(lines, _STYLES, strict=False):
-        yield line, {"role": role, "color": color}
+        yield {"line": line, "role": role, "color": color}
 
 
 _PICTURES = {"alpha": _alpha, "impulses": _impulses, "curves": _curves, "posterior": _posterior}

@@ -144,11 +144,11 @@ def _panels(rows: Iterable[Sequence[str]], sources: Mapping[str, Any]) -> list[P
     for kind, *cells in rows:
         if kind == "panel":
             x, y, height, *factor = (_written(cell, sources) for cell in cells)
-            x_axis, y_axis = (sources.get(axis, {}) for axis in ("x_axis", "y_axis"))
             scale = float(*factor or (1.0,))
             traces, true = [*sources.get("traces", ())], sources.get("true", False)
-            axes = PlotAxis(x, **x_axis), PlotAxis(y, **y_axis)
-            panels.append(Panel(*axes, traces, float(height), true))
+            labels = {"x_axis": x, "y_axis": y}.items()
+            across, up = (PlotAxis(label, **sources.get(axis, {})) for axis, label in labels)
+            panels.append(Panel(across, up, traces, float(height), true))
         elif kind == "residuals":
             panels += residual_panels(panels[-1].x, _points(cells, sources))
         else:

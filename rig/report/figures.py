@@ -37,7 +37,6 @@ def result_figure(
     analysis: Analysis,
     curves: Mapping[str, Any],
     bars: Bars = "U95",
-    site_m_s2: float | None = None,
 ) -> Chart | None:
     """Return the figure of results against incline, or by run for few inclines or other settings.
 
@@ -47,8 +46,6 @@ def result_figure(
         Predictions of `rig.analysis.curves.model_curves`; may be empty.
     bars
         Meaning of the bars on means.
-    site_m_s2
-        Expected gravity, for scenes without a surface.
     """
     good = [run for run in analysis.runs if run.verdict in GOOD]
     measured = {name for run in good for name in run.quantities}
@@ -56,10 +53,10 @@ def result_figure(
     if not rows:
         return None
     title = " and ".join(f"{row.title} {row.symbol}" for row in rows)
-    inclines = {run.run.incline_deg for run in analysis.runs}
-    varied = any(run.run.setting for run in analysis.runs)
-    if len(inclines) < FEWEST_INCLINES or varied or acceleration_in(measured):
-        return chart("runs", *(_by_run(analysis, row, site_m_s2) for row in rows), title=title)
+    # There is one curve only where nothing but the incline varies.
+    inclines = {run.run.incline_deg for run in analysis.runs if not run.run.setting}
+    if len(inclines) < FEWEST_INCLINES or acceleration_in(measured):
+        return chart("runs", *(_by_run(analysis, row) for row in rows), title=title)
     gaps = _model_gaps(curves)
     sources = (
         {
@@ -180,12 +177,11 @@ def _model_parts(curves: Mapping[str, Any], row: Measurand) -> Iterator[dict[str
         yield {"role": role, "color": color, "label": label, "points": [*points]}
 
 
-def _by_run(analysis: Analysis, row: Measurand, site_m_s2: float | None) -> dict[str, Any]:
+def _by_run(analysis: Analysis, row: Measurand) -> dict[str, Any]:
     """Return a measurand in each run, its mean with U as a band, and the expected value."""
     means = means_of(analysis.summary, row)
-    expected = [site_m_s2] if acceleration_in([row.name]) else []
-    expected += [value_of(mean.line.predicted.get(row.name)) for mean in means]
-    stated = [*{value for value in expected if value is not None}]
+    expected = {value_of(mean.line.predicted.get(row.name)) for mean in means}
+    stated = [value for value in expected if value is not None]
     stated *= len(stated) == 1
     return {
         "row": row,

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 from rig.analysis.session import Analysis
 from rig.analysis.summary import Incline
-from rig.measurands import ACCELERATION, GRAVITY, Measurand, averaged
+from rig.measurands import ACCELERATION, GRAVITY, Measurand, acceleration_in, averaged
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Protocol
 from rig.reasons import remedies, summarize_reasons
 from rig.report.numbers import plus_minus
-from rig.report.parts import means_of, summary_incline
+from rig.report.parts import means_of
 from rig.report.templates import lines, sentence
 from rig.results.improvements import improvements
 from rig.results.whole import SessionResults
@@ -64,10 +64,10 @@ def headline(summary: Sequence[Incline]) -> list[Number]:
             quantity = row.symbol if row in _REFERENCES else f"{row.title} {row.symbol}"
             place = _place(line) if len(means) > 1 else ""
             numbers.append(Number(quantity, value, row.unit, place))
+    differences = summary[0].differences if len(summary) == 1 else {}
     for row in averaged():
-        if len(summary) == 1 and row.name in summary[0].differences:
-            difference = summary[0].differences[row.name]
-            value = plus_minus(difference, row.fine_scale, row.fine_decimals)
+        if row.name in differences:
+            value = plus_minus(differences[row.name], row.fine_scale, row.fine_decimals)
             numbers.append(Number(f"{row.symbol} − {_reference(row)}", value, row.fine))
     return numbers[:MOST_NUMBERS]
 
@@ -88,8 +88,9 @@ def _reference(row: Measurand) -> str:
 
 
 def _place(line: Incline) -> str:
-    striker = line.condition.impact_chain and f"{line.condition.impact_chain} strikes"
-    return ", ".join(filter(None, (f"{summary_incline(line)}°", striker, line.condition.setting)))
+    """Return the condition of a mean in words; an acceleration has no incline."""
+    condition = line.condition
+    return condition.setting if acceleration_in(line.means) else f"{condition}".replace(" deg", "°")
 
 
 def remarks(results: SessionResults) -> list[str]:

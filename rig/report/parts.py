@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rig.analysis.result import COUNTS
@@ -13,7 +14,7 @@ from rig.report.columns import table_parts
 from rig.report.numbers import degrees, signed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from rig.analysis.result import Measured
     from rig.analysis.summary import Incline
@@ -85,13 +86,6 @@ def means_parts(summary: Sequence[Incline]) -> list[Part]:
     return [part for row in averaged() for part in tables("model", means_of(summary, row), row=row)]
 
 
-def tables(
-    name: str, records: Iterable[Any], words: Iterable[str] = (), row: Measurand | None = None
-) -> Iterator[Part]:
-    """Yield a table of ``columns.txt`` for means or drops."""
-    return table_parts(name, records, words, _CELLS, row)
-
-
 def scatter_parts(summary: Sequence[Incline]) -> Iterator[Part]:
     """Yield the table of scatter."""
     return tables("scatter", (mean for line in summary for mean in means_of([line])))
@@ -107,6 +101,9 @@ _CELLS: dict[str, Callable[[Any], str]] = {
     "reasons": lambda drop: signed(sentences(drop.reasons)),
     "remedies": lambda drop: "; ".join(remedies(drop.reasons)) if drop.verdict == "void" else "",
 }
+
+tables = partial(table_parts, derived=_CELLS)
+"""Yields a table of ``columns.txt`` for means or drops."""
 
 
 def summary_table(summary: Sequence[Incline]) -> str:

@@ -81,7 +81,8 @@ def plot(chart: Chart, width: float | None = None) -> Figure:
     shared = [panel.x == follower.x for panel, follower in pairwise(panels)]
     below = [_GAP_PT if joined else _GAP_PT + 2.6 * _LINE for joined in shared]
     below.append((3 + len(foot)) * _LINE)
-    top = height = (1 + chart.simulated) * _LINE + sum(below) + sum(each.height for each in panels)
+    top = sum(below) + sum(each.height for each in panels)
+    height = top + (1 + chart.simulated) * _LINE
     left = max(
         _LINE * (1.5 + panel.y.label.count("\n"))
         + _LETTER * max([_DIGITS, *map(len, panel.y.names.values())])
@@ -92,7 +93,6 @@ def plot(chart: Chart, width: float | None = None) -> Figure:
         stamp = "SIMULATED DATA" if chart.simulated else ""
         figure.text(0.995, 1.0, stamp, ha="right", va="top", color=COLORS[SECOND][0])
         figure.text(0.005, 4.0 / height, "\n".join(foot), va="bottom", family="monospace")
-        top -= (1 + chart.simulated) * _LINE
         for panel, gap, joined in zip(panels, below, [*shared, False], strict=True):
             top -= panel.height
             box = left, top, width - left - _RIGHT_PT, panel.height

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from operator import attrgetter
 from typing import Any
 
 from rig.analysis.averages import by_case, combine
@@ -21,6 +22,7 @@ from rig.measurands import averaged
 from rig.plain_data import Record, attributes, plain
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Condition, Protocol
+from rig.protocol.variants import SCENE
 from rig.reasons import rig_error
 from rig.results.known_drops import edges_digest
 from rig.results.whole import SessionResults, check_open, complete_analysis, protocol_of, results
@@ -274,10 +276,8 @@ def _pool_means(parts: Sequence[SessionPart]) -> dict[tuple[str, ...], tuple[Inc
     """Return means over all sessions with the same predictions, by their names."""
     scenes: dict[str, list[SessionPart]] = {}
     for part in parts:
-        own = part.protocol
-        scene = (own.chains, own.surface, own.contact, own.drop, own.gravity, own.drag)
-        more = own.track, own.initial_speed, own.variants
-        scenes.setdefault(repr((*scene, *more)), []).append(part)
+        scene = attrgetter(*SCENE, "initial_speed", "variants")(part.protocol)
+        scenes.setdefault(repr(scene), []).append(part)
     return {
         tuple(part.name for part in alike): summarize(
             alike[0].protocol, [run for part in alike for run in part.analysis.runs]

@@ -51,9 +51,8 @@ def drop_pictures(view: SessionView, job: Job) -> list[Picture]:
 
 def session_pictures(view: SessionView) -> Iterator[tuple[Picture, str]]:
     """Yield figures of results and of runs in order (for drifts), each with its caption."""
-    analysis, gravity = view.analysis, view.protocol.gravity.value
     for chart in (
-        result_figure(analysis, view.curves, site_m_s2=gravity),
-        runs_figure(analysis, view.protocol.accept.release_skew),
+        result_figure(view.analysis, view.curves),
+        runs_figure(view.analysis, view.protocol.accept.release_skew),
     ):
         yield from ((picture, chart.caption) for picture in pictures_of(chart) if chart)

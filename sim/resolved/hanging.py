@@ -40,9 +40,8 @@ def stable_step(chain: Chain) -> float:
     # A rod's end weighs a share of the rod; its two strings pull one against the other.
     fastest = np.sqrt(2.0 * both / chain.rods.end_mass / bodies.mass).max()
     strings = _SOUND / float(fastest) if fastest else math.inf
-    bounces = [chain.board.bounce] if chain.board is not None else []
-    bounces += [chain.touching] if chain.touching is not None else []
-    return min([strings, *(first.time_s / _TOUCH for first in bounces)])
+    bounces = chain.board.bounce if chain.board else None, chain.touching
+    return min([strings, *(bounce.time_s / _TOUCH for bounce in bounces if bounce is not None)])
 
 
 def gaps(world: World) -> Numbers:

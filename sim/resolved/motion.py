@@ -262,6 +262,14 @@ def _touches(record: Record, k: int, overlap: float, rate: float) -> None:
     record.since[k] = max(record.since[k], overlap / max(rate, 1e-3))
 
 
+@jit
+def _kicked(bodies: Bodies, k: int, step: float) -> tuple[Vector, Vector]:
+    """Velocity and angular momentum of a rod once the last forces have acted for so long."""
+    push = _times(step / bodies.mass[k], _row(bodies.force, k))
+    twist = _times(step, _row(bodies.torque, k))
+    return _plus(_row(bodies.velocity, k), push), _plus(_row(bodies.spin, k), twist)
+
+
 @inlined
 def drift(bodies: Bodies, step: float) -> None:
     """Move on without forces: the axis of a free symmetric rod turns about its spin."""
@@ -277,10 +285,8 @@ def drift(bodies: Bodies, step: float) -> None:
 def _by_themselves(bodies: Bodies, record: Record, step: float) -> None:
     """Foresee velocities at the half step; then gravity and air alone act."""
     for k in range(bodies.mass.size):
-        mass = bodies.mass[k]
-        velocity = _plus(_row(bodies.velocity, k), _times(step / 2.0 / mass, _row(bodies.force, k)))
-        spin = _plus(_row(bodies.spin, k), _times(step / 2.0, _row(bodies.torque, k)))
-        axis = _row(bodies.axis, k)
+        mass, axis = bodies.mass[k], _row(bodies.axis, k)
+        velocity, spin = _kicked(bodies, k, step / 2.0)
         rolling = _times(_dot(spin, axis) * bodies.roll[k], axis)
         _keep(bodies.foreseen, k, velocity)
         _keep(bodies.turning, k, _plus(_times(1.0 / bodies.across[k], spin), rolling))
@@ -336,7 +342,7 @@ def rim(bodies: Bodies, normal: Vector, k: int) -> Vector:
 def _strike(bodies: Bodies, ground: Ground, record: Record, step: float) -> None:
     """Let the board push."""
     normal = ground.normal
-    record.pushing[0] = record.pushing[1] = record.pushing[2] = 0.0
+    record.pushing[:] = 0.0
     for k in range(bodies.mass.size):
         above = _dot(normal, _row(bodies.place, k)) - ground.level
         lean = abs(_dot(normal, _row(bodies.axis, k)))
@@ -487,10 +493,8 @@ def _frame(world: World, step: float, pages: Pages, n: int) -> None:
     energy = record.elastic[0]
     momentum = (0.0, 0.0, 0.0)
     for k in range(bodies.mass.size):
-        mass = bodies.mass[k]
-        velocity = _plus(_row(bodies.velocity, k), _times(step / 2.0 / mass, _row(bodies.force, k)))
-        spin = _plus(_row(bodies.spin, k), _times(step / 2.0, _row(bodies.torque, k)))
-        axis = _row(bodies.axis, k)
+        mass, axis = bodies.mass[k], _row(bodies.axis, k)
+        velocity, spin = _kicked(bodies, k, step / 2.0)
         turning = _dot(spin, spin) / bodies.across[k] + _dot(spin, axis) ** 2 * bodies.roll[k]
         energy += 0.5 * (mass * _dot(velocity, velocity) + turning)
         energy += mass * bodies.gravity[k] * bodies.place[k, 2]
@@ -534,8 +538,8 @@ def advance(world: World, clock: Clock, first: int, pages: Pages) -> int:
         if n % FRAME == 0:
             _frame(world, step, pages, n // FRAME)
         for k in range(number):
-            for c in range(3):
-                bodies.velocity[k, c] += step / bodies.mass[k] * bodies.force[k, c]
-                bodies.spin[k, c] += step * bodies.torque[k, c]
+            velocity, spin = _kicked(bodies, k, step)
+            _keep(bodies.velocity, k, velocity)
+            _keep(bodies.spin, k, spin)
         drift(bodies, step)
     return room

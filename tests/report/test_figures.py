@@ -49,7 +49,7 @@ def figures() -> list[Chart]:
     line = replace(TWO.summary[0], means={"separation_m": mean}, causes=causes)
     return [
         result_figure(TWO, CURVES),
-        result_figure(fake_analysis.gravity(), {}, site_m_s2=9.82),
+        result_figure(fake_analysis.gravity(), {}),
         runs_figure(TWO, 0.005),
         budget_figure([line]),
     ]

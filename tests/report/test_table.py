@@ -1,6 +1,7 @@
 """Tables in the terminal and on the page, and the digits of numbers."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import pytest
@@ -68,15 +69,15 @@ def test_the_clock_is_told_in_plain_numbers() -> None:
 
 
 def test_a_column_is_never_left_out_because_its_value_has_another_name():
-    record = {"session": "a", "runs": "", "line": SimpleNamespace(n=3, means={})}
-    (part,) = table_parts("sessions", [record], row=SEPARATION)
+    record = {"session": "a", "line": SimpleNamespace(n=3, means={})}
+    sessions = partial(table_parts, "sessions", derived={"runs": lambda _: ""}, row=SEPARATION)
+    (part,) = sessions([record])
     assert [heading for heading, _ in part.head] == ["session", "n"]
-    renamed = {"session": "a", "kinds": "", "line": record["line"]}
-    with pytest.raises(KeyError, match="runs"):
-        [*table_parts("sessions", [renamed], row=SEPARATION)]
+    with pytest.raises(KeyError, match="session"):
+        [*sessions([{"name": "a", "line": record["line"]}])]
     record["line"] = SimpleNamespace(number=3, means={})
     with pytest.raises(AttributeError, match="'n'"):
-        [*table_parts("sessions", [record], row=SEPARATION)]
+        [*sessions([record])]
 
 
 def test_a_place_may_lead_to_nothing():
