@@ -135,8 +135,10 @@ class ChainLab:
         *setting: str,
     ) -> None:
         check_released(protocol)
-        scenes = [*protocol.settings.items()][1:]
-        self.others = {at: type(self)(scene, dials, seed, tell, at) for at, scene in scenes}
+        self.others = {}
+        for at, scene in [*protocol.settings.items()][1:]:
+            height = [f"{scene.drop.value} m"] * (scene.drop != protocol.drop)
+            self.others[at] = type(self)(scene, dials, seed, tell, *height)
         self.protocol = protocol
         self.seed = seed
         self.dials = dials = dials.on(protocol, self._share)

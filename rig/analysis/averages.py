@@ -25,11 +25,13 @@ T = TypeVar("T")
 def by_case(
     protocol: Protocol, members: Iterable[T], run_of: Callable[[T], Run] = attrgetter("run")
 ) -> dict[Condition, list[T]]:
-    """Group members by incline and, if chains differ, by striking chain, in order."""
+    """Group members by incline, striking chain if chains differ, and setting, in order."""
     groups: dict[Condition, list[T]] = {}
     for member in members:
         groups.setdefault(protocol.condition(run_of(member)), []).append(member)
-    return dict(sorted(groups.items()))
+    places = {setting: place for place, setting in enumerate(protocol.variants)}
+    in_order = sorted(groups, key=lambda at: (at[:2], places.get(at.setting)))
+    return {condition: groups[condition] for condition in in_order}
 
 
 def mean(runs: Sequence[Measured]) -> Measured:

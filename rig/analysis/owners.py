@@ -14,13 +14,15 @@ def statements(protocol: Protocol) -> dict[str, object]:
     Returns
     -------
     dict
-        For ``rig``, ``posts``, ``beams``, ``start``, ``condition`` and each ``chain NAME``.
+        For ``rig``, ``air``, ``posts``, ``beams``, ``start``, ``condition``, and ``chain NAME`` of
+        each chain.
     """
     gates, chains = protocol.gates, protocol.chains
     beams = [(gate.channel, gate.height, gate.side) for gate in gates.gates]
     scene = (chains, protocol.surface, protocol.contact, protocol.drop)
     return {
-        "rig": (protocol.gravity, protocol.drag, protocol.track, protocol.reference_u),
+        "rig": protocol.reference_u,
+        "air": (protocol.gravity, protocol.drag, protocol.track),
         "posts": (gates.posts, gates.datum_u),
         "beams": (beams, gates.height_u),
         "start": protocol.drop,
@@ -30,10 +32,14 @@ def statements(protocol: Protocol) -> dict[str, object]:
 
 
 def suffixes(protocol: Protocol, run: Run) -> dict[str, str]:
-    """Return suffixes of the names of unknowns that a run's setting does not share with others.
+    """Return suffixes of the names of unknowns that not all settings of a plan share.
 
-    A condition's own name has the setting.
+    They name the first setting that states the same of an owner; a condition's name has its own.
     """
-    common, own = statements(protocol), statements(protocol.of(run)).items()
-    varied = [owner for owner, statement in own if statement != common[owner]]
-    return {owner: f" ({run.setting})" for owner in varied if owner != "condition"}
+    scenes = {at: statements(protocol.settings[at]) for at in protocol.variants}
+    suffixes = {}
+    for owner, statement in scenes.get(run.setting, {}).items():
+        first = next(at for at, scene in scenes.items() if scene[owner] == statement)
+        if owner != "condition" and first != next(iter(scenes)):
+            suffixes[owner] = f" ({first})"
+    return suffixes

@@ -72,9 +72,11 @@ def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects,
     order = [first, second, second, first]
     good = {result.run: result for result in good_runs(results)}
     signs = np.array([1.0, -1.0, -1.0, 1.0])  # first chain less second, for each run of a block
-    case = attrgetter("incline_deg", "setting")
-    planned, every = sorted(planned_runs(protocol), key=case), []
-    for (incline, setting), group in groupby(planned, case):
+    places, every = [*protocol.settings], []
+    planned = sorted(
+        planned_runs(protocol), key=lambda run: (run.incline_deg, places.index(run.setting))
+    )
+    for (incline, setting), group in groupby(planned, attrgetter("incline_deg", "setting")):
         runs = [*group]
         fours = zip(*(runs[place::4] for place in range(4)), strict=False)
         blocks = [

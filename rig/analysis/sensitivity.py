@@ -6,9 +6,8 @@ do: a stated scatter has little weight if the drops determine it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields, replace
-from functools import partial
 from typing import Any
 
 from rig.analysis.budgets import Budgets
@@ -23,7 +22,7 @@ FACTOR = 3.0
 
 
 @one_thread
-def prior_sensitivity(analysis: Analysis) -> list[dict[str, Any]]:
+def prior_sensitivity(protocol: Protocol, analysis: Analysis) -> list[dict[str, Any]]:
     """Fit a session again with each prior wider and narrower.
 
     Returns
@@ -34,14 +33,10 @@ def prior_sensitivity(analysis: Analysis) -> list[dict[str, Any]]:
     """
     if not analysis.adjusted:
         return []
-    protocol = next(iter(analysis.adjusted.values())).model.protocol
-    unchanged = _again(lambda stated: stated, analysis)
+    unchanged = _again(protocol, analysis)
     rows = []
     for name, place in _priors(protocol).items():
-        wider, narrower = (
-            _again(partial(_scale_at, place=place, by=by), analysis)
-            for by in (FACTOR, 1.0 / FACTOR)
-        )
+        wider, narrower = (_again(protocol, analysis, place, by) for by in (FACTOR, 1.0 / FACTOR))
         # A prior whose joint fit did not converge is left out.
         for line, *changed in zip(unchanged, wider, narrower, strict=False):
             for quantity, mean in line.means.items():
@@ -53,13 +48,15 @@ def prior_sensitivity(analysis: Analysis) -> list[dict[str, Any]]:
     return rows
 
 
-def _again(change: Callable[[Protocol], Protocol], analysis: Analysis) -> tuple[Incline, ...]:
-    """Return the summary with the priors of changed protocols; empty if the fit diverges."""
+def _again(
+    protocol: Protocol, analysis: Analysis, place: tuple[str, ...] = (), by: float = 1.0
+) -> tuple[Incline, ...]:
+    """Return the summary with a prior multiplied; empty if the fit diverges."""
     fits = []
     for drop in analysis.adjusted.values():
-        protocol = drop.model.protocol
-        model = drop.model.under(change(protocol.stated or protocol))
-        fits.append(replace(drop, model=model))
+        own = drop.model.protocol.stated or drop.model.protocol
+        changed = _scale_at(own, place, by) if place else own
+        fits.append(replace(drop, model=drop.model.under(changed)))
     joints = [joint_fit(fits)] if analysis.joint else [by_itself(alone(fit)) for fit in fits]
     if analysis.joint and not joints[0].settled:
         return ()

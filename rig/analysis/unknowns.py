@@ -115,7 +115,7 @@ class Unknown:
     line: str
     sd: Callable[[Side], float | Sequence[float] | Array | None]
     of: Literal["all", "each", "impact", "free"] = "all"
-    shared: Literal["rig", "posts", "beams", "start", "chain", "condition", "drop"] = "drop"
+    shared: Literal["rig", "air", "posts", "beams", "start", "chain", "condition", "drop"] = "drop"
     moves: str = ""
     path: Effect = lambda _side: np.ones(1)
     level: Effect | None = None
@@ -274,6 +274,7 @@ TABLE = (
         "gravity",
         "gravity",
         lambda side: None if side.protocol.surface is None else side.protocol.gravity.u,
+        shared="air",
         moves="gravity",
     ),
     Unknown(  # Where gravity is the measurand, each drop has its own value.
@@ -296,6 +297,7 @@ TABLE = (
         "drag",
         "air",
         lambda side: side.model.kappa_u,
+        shared="air",
         moves="drag",
         absent=lambda side: float(side.protocol.drag is None),
     ),

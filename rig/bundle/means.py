@@ -20,7 +20,9 @@ def mean_tables(protocol: Protocol, analysis: Analysis) -> dict[str, str]:
     means: list[dict[str, object]] = []
     shared = {}
     for line in analysis.summary:
-        at = line.condition.json() if protocol.surface is not None else {}
+        at = line.condition.json()
+        if protocol.surface is None:
+            del at["incline_deg"]
         for name, mean in line.means.items():
             degrees = mean.degrees if math.isfinite(mean.degrees) else "INF"
             means.append({**at, "n": line.n, "quantity": name, **mean.json(), "degrees": degrees})

@@ -36,9 +36,11 @@ def _meanings() -> dict[str, str]:
         for column in TABLES[table].columns
     } | _ROWS
     for row in MEASURANDS.values():
-        meanings[row.name] = row.meaning
-        meanings[row.key("sd")] = f"{row.symbol}: standard deviation between runs"
-        meanings[row.key("se")] = f"{row.symbol}: standard error of the mean"
+        meanings |= {
+            row.name: row.meaning,
+            row.key("sd"): f"{row.symbol}: standard deviation between runs",
+            row.key("se"): f"{row.symbol}: standard error of the mean",
+        }
     return meanings
 
 

@@ -10,7 +10,7 @@ from rig.measurands import acceleration_in
 from rig.reasons import make_reason
 from rig.report.parts import scatter_parts, tables
 from rig.report.templates import lines
-from rig.results.whole import SessionResults, complete_analysis, results
+from rig.results.whole import SessionResults, complete_analysis, protocol_of, results
 from rig.session.store import Session
 from rig.timers.video import read_video
 
@@ -58,7 +58,9 @@ def _sensitivity(session: Session, outcome: SessionResults, *, fresh: bool) -> l
     from rig.analysis.sensitivity import prior_sensitivity  # noqa: PLC0415 - only when it is asked for
 
     def make() -> list[dict[str, Any]]:
-        return prior_sensitivity(complete_analysis(session, outcome, progress))
+        return prior_sensitivity(
+            protocol_of(session), complete_analysis(session, outcome, progress)
+        )
 
     return recall(list, make, "priors", outcome.digest, fresh=fresh)
 

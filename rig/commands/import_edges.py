@@ -92,8 +92,8 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
     order = sorted(compared, key=lambda n: (places[n + 1] - places[n], lasting[n]))
     for n in sorted({*order[:: 1 + len(order) // _MOST], *order[-1:]}):
         run, drop = planned[reading.runs[n]], reading.drop(n)
-        records = chain_records(protocol, run, drop, TICK_HZ)
-        votes = sum(most_votes(protocol, record, rate.u) for record in records)
+        records = chain_records(protocol.of(run), run, drop, TICK_HZ)
+        votes = sum(most_votes(protocol.of(run), record, rate.u) for record in records)
         due = sum(record.edge_count for record in records)
         # A single edge is near one of some fall, whenever that began.
         shares.append((votes / max(2, len(drop.edges), due), n))

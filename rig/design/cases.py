@@ -11,11 +11,13 @@ import numpy as np
 from rig.analysis.chain_records import ChainRecord, EdgeTrain, chain_records
 from rig.analysis.components import Components
 from rig.analysis.drop_model import DropModel
+from rig.analysis.owners import suffixes
 from rig.analysis.quantities import measurands
 from rig.analysis.square_root import EquationRows
 from rig.analysis.unknowns import SharedUnknowns
 from rig.arrays import Array, Index
 from rig.estimate.hypotheses import model_alpha
+from rig.estimate.session import check_alike
 from rig.protocol.contact import of_run
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol, Run
@@ -83,6 +85,7 @@ def cases(protocol: Protocol, components: Components) -> tuple[Case, ...]:
     components
         How much everything scatters.
     """
+    check_alike(protocol)
     counts = Counter(run.kind for run in runs(protocol))
     kinds = sorted(counts, key=lambda run: (run.incline_deg, str(run.impact)))
     models = []
@@ -90,6 +93,7 @@ def cases(protocol: Protocol, components: Components) -> tuple[Case, ...]:
         model, x = predict_drop(of_run(protocol, run), run, components)
         seen = perfect(model, x)
         models.append((DropModel(model.protocol, seen, CLOCK_U, components), x))
+        models[-1][0].owners = suffixes(protocol, run)
     shared = SharedUnknowns(model for model, _ in models)
     # Beams are left out here and added by each layout: the rest is worked out once for all.
     places = np.full(len(shared), -1)

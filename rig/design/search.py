@@ -21,6 +21,7 @@ from rig.design.trials import MARGIN, margin
 from rig.measurands import averaged
 from rig.protocol.gates import blocking_rod, hanging_rods
 from rig.protocol.protocol import Gate, Gates, Protocol
+from rig.reasons import rig_error
 from rig.threads import one_thread
 
 COEFFICIENTS = ("restitution", "friction")
@@ -89,6 +90,8 @@ def better(
     say
         Told how far it is.
     """
+    if protocol.variants:
+        raise rig_error("search_varied")
     present, heights = protocol.gates, candidates(protocol, limits)
     gates = [*present.gates, *(Gate(0, z, side) for side in present.posts for z in heights)]
     inclines = sorted(protocol.plan.inclines)

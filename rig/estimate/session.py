@@ -149,6 +149,19 @@ class SessionEstimate:
         return record | attributes(self, *known, "failed?")
 
 
+def check_alike(protocol: Protocol) -> None:
+    """Raise an error for a plan that varies what impacts depend on: all but the drop height.
+
+    Raises
+    ------
+    InputError
+        Names the settings.
+    """
+    scenes = [replace(scene, drop=protocol.drop) for scene in protocol.variants.values()]
+    if protocol.surface is not None and any(scene != scenes[0] for scene in scenes):
+        raise rig_error("impacts_varied", keys="; ".join(protocol.variants))
+
+
 @one_thread
 def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
     """Estimate what the impacts of a session have in common.
@@ -167,9 +180,7 @@ def estimate(protocol: Protocol, analysis: Analysis) -> SessionEstimate:
     """
     if protocol.surface is None:
         raise rig_error("impacts_absent")
-    scenes = [replace(scene, drop=protocol.drop) for scene in protocol.settings.values()]
-    if any(scene != scenes[0] for scene in scenes):
-        raise rig_error("impacts_varied", keys="; ".join(protocol.variants))
+    check_alike(protocol)
     good = {result.job: result.run for result in analysis.runs if result.verdict in GOOD}
     drops = {key: analysis.adjusted[key] for key in good if key in analysis.adjusted}
     if not drops:

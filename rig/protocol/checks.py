@@ -86,9 +86,8 @@ def _check_plan(plan: Section, *, struck: bool, turns: bool) -> None:
             plan.faults.add(item.place, f"{plan.key('incline')}[{n}]", message)
         elif inclines[n] is not None:
             lines[inclines[n]] = item.place.line
-    varied = plan["vary"].entries if plan["vary"] else ()
-    settings = prod(len(getattr(values, "items", "-")) for _, values in varied)
-    cases = settings * len(inclines)
+    varied = getattr(plan["vary"], "entries", ())
+    cases = len(inclines) * prod(len(getattr(values, "items", "-")) for _, values in varied)
     runs = cases * plan["repeats"] if plan.is_sound("incline", "repeats") else 0
     if runs > MOST_RUNS:
         plan.fault("repeats", f"found {runs} runs; at most {MOST_RUNS} are accepted")

@@ -38,7 +38,7 @@ def touching_heights(chain: RodChain, incline_deg: float) -> tuple[float, ...]:
 def lacking_geometry(chain: RodChain) -> tuple[str, ...]:
     """Return the missing keys of a chain that `touching_heights` needs."""
     needed = {"diameter", "rod_length"} if chain.tilt_deg else {"diameter"}
-    return tuple(key for key in chain.missing_keys if key in needed)
+    return tuple(filter(needed.__contains__, chain.missing_keys))
 
 
 def higher_contacts(protocol: Protocol, incline_deg: float, chain: RodChain) -> tuple[float, ...]:
@@ -81,7 +81,7 @@ def contact_level(protocol: Protocol, incline_deg: float, struck: str) -> Quanti
     level = protocol.contact.level
     if not protocol.contact.from_board or protocol.stated is not None:
         return level
-    top_rod = touching_heights(protocol.chains[struck], incline_deg)[-1]
+    *_, top_rod = touching_heights(protocol.chains[struck], incline_deg)
     return Quantity(top_rod + level.value, level.u)
 
 

@@ -19,7 +19,7 @@ from rig.units import UnitError, did_you_mean, parse, quote
 
 @dataclass(slots=True)
 class Faults:
-    """The problems noted so far in a file; `setting` of a plan's varied keys is told with each."""
+    """The problems noted so far in a file; each ends with the `setting` of a plan's varied keys."""
 
     source: str
     setting: str = ""
@@ -27,8 +27,7 @@ class Faults:
 
     def add(self, place: Place, key: str, message: str) -> None:
         """Note a problem; a fault that chains inherit by `like` is noted once, at its place."""
-        told = f"{message} ({self.setting})" if self.setting else message
-        problem = Problem(self.source, *place, key, told)
+        problem = Problem(self.source, *place, key, message + self.setting)
         self.problems.setdefault((*place, message), problem)
 
 
@@ -61,7 +60,7 @@ class Section:
         self.keys, self.nodes = unique_entries(node, path, faults)
         self._accepted = keys.SECTIONS[table]
         self._faulty: set[str] = set()
-        self._unknown = self.keys.keys() - self._accepted.keys()
+        self._unknown = self.keys.keys() - self._accepted
         for name in self._unknown:
             self.fault(name, _unknown_key(name, self._accepted), at_key=True)
         self.values = {name: self._read(name, key) for name, key in self._accepted.items()}

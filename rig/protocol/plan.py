@@ -69,7 +69,7 @@ def _shuffle(items: list[T], seed: int) -> list[T]:
 
     source = random.Random(seed)
     result = list(items)
-    for last in range(len(result) - 1, 0, -1):
+    for last in reversed(range(1, len(result))):
         swap = int(source.random() * (last + 1))
         result[last], result[swap] = result[swap], result[last]
     return result

@@ -11,7 +11,6 @@ from math import cos, hypot, radians, sin
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from rig.protocol.fields import DEFAULTS
-from rig.protocol.variants import SCENE
 from rig.units import Quantity
 from rig.vocabulary import FENCE, FREE_CHAIN, OBJECT, ONE_CHAIN, TRACK, TWO_CHAINS, Vocabulary
 
@@ -394,28 +393,29 @@ class Protocol:
 
     def with_gates(self, gates: Iterable[Gate]) -> Protocol:
         """Return the protocol with other gates, whose heights are as uncertain."""
-        return replace(self, gates=replace(self.gates, gates=tuple(gates)))
+        arrays = replace(self.gates, gates=tuple(gates))
+        variants = {at: replace(scene, gates=arrays) for at, scene in self.variants.items()}
+        return replace(self, gates=arrays, variants=variants)
 
     @property
     def settings(self) -> Mapping[str, Protocol]:
-        """The scene in each setting, with the gates of this protocol; itself if there is one."""
-        return {
-            at: replace(self, variants={}, **{name: getattr(variant, name) for name in SCENE})
-            for at, variant in self.variants.items()
-        } or {"": self}
+        """The scene in each setting of the keys that the plan varies; itself if it varies none."""
+        return self.variants or {"": self}
 
     def of(self, run: Run) -> Protocol:
         """Return the scene in the setting of a run."""
-        return self.settings.get(run.setting, self)
+        return self.variants.get(run.setting, self)
 
     def condition(self, run: Run) -> Condition:
         """Return the condition of a run, for averages over runs.
 
         Without a surface the measurand is gravity, the same in all settings unless they change it.
         """
-        gravity = {self.gravity, *(scene.gravity for scene in self.variants.values())}
-        setting = run.setting if self.surface is not None or len(gravity) > 1 else ""
-        return Condition(run.incline_deg, run.impact if self.unlike_chains else None, setting)
+        scenes = self, *self.variants.values()
+        unlike = any(scene.unlike_chains for scene in scenes)
+        is_apart = self.surface is not None or len({scene.gravity for scene in scenes}) > 1
+        chain = run.impact if unlike else None
+        return Condition(run.incline_deg, chain, run.setting if is_apart else "")
 
 
 class Condition(NamedTuple):
@@ -429,7 +429,7 @@ class Condition(NamedTuple):
     setting: str = ""
 
     def __str__(self) -> str:
-        chain = "" if self.impact_chain is None else f"{self.impact_chain} strikes"
+        chain = self.impact_chain and f"{self.impact_chain} strikes"
         return ", ".join(filter(None, (f"{self.incline_deg:.15g} deg", chain, self.setting)))
 
     def json(self) -> dict[str, float | str]:

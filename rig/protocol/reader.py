@@ -62,8 +62,8 @@ def read(path: str | os.PathLike[str]) -> scene.Protocol:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         before = data[: error.start].decode("utf-8")
-        place, message = place_at(before, len(before)), "not UTF-8 text; save the file as UTF-8"
-        problem = Problem(source, place.line, place.column, "", message)
+        place = place_at(before, len(before))
+        problem = Problem(source, *place, "", "not UTF-8 text; save the file as UTF-8")
         raise InputError(problems=[problem]) from None
     return parse(text, source)
 
@@ -97,14 +97,14 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> scene.P
     scenes = {at: _read_scene(root, text, faults, kept=kept) for at in vary(root, faults)}
     if faults.problems:
         raise InputError(problems=faults.problems.values())
-    variants = {at: scene for at, scene in scenes.items() if scene is not None}
+    variants = {at: each for at, each in scenes.items() if each}
     first = next(iter(variants.values()))
     return first if "" in variants else replace(first, variants=variants)
 
 
 def _read_scene(root: Node, text: str, faults: Faults, *, kept: bool) -> scene.Protocol | None:
     """Return the protocol of a tree; `None` if it is faulty."""
-    top: Section | None = read_value(Plain.MAPPED, root, "", "", faults)
+    top = read_value(Plain.MAPPED, root, "", "", faults)
     if top is None:
         return None
     chains, source = read_chains(top), faults.source

@@ -38,7 +38,7 @@ def _object(path: str, description: str) -> dict[str, Any]:
     if path == "plan.vary":
         return head | {"additionalProperties": {"type": "array", "minItems": 1}}
     if path not in keys.SECTIONS:
-        inner = _object(f"{path}.{keys.ANY}", "a chain")
+        inner = _object(f"{path}.*", "a chain")
         return head | {"additionalProperties": inner, "minProperties": 1, "maxProperties": 2}
     table = keys.SECTIONS[path]
     properties = {name: _property(key) for name, key in table.items()}

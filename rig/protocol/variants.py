@@ -10,11 +10,12 @@ import math
 from collections.abc import Iterator
 from itertools import product
 
+from rig.printable import one_line
 from rig.protocol.fields import Faults
 from rig.protocol.yamltree import Mapping, Node, ScalarNode, Sequence
 
-SCENE = ("chains", "surface", "drop", "gravity", "track", "drag", "contact")
-"""First words of keys that runs may vary, and attributes of a protocol that follow from them."""
+SCENE = ("chains", "surface", "drop", "track", "drag", "contact")
+"""First words of keys that runs may vary."""
 MOST = 100
 """Most settings of a plan: each is read like a file of its own."""
 
@@ -34,36 +35,39 @@ def vary(root: Node, faults: Faults) -> Iterator[str]:
     str
         The setting in words; once an empty one if the plan varies nothing.
     """
-    choices = []
-    for key, values in _entries(_find(root, ["plan", "vary"])):
+    choices, varied = [], _find(root, ["plan", "vary"])
+    for key, values in varied.entries if isinstance(varied, Mapping) else ():
         *way, name = _text(key).split(".")
         section = _find(root, way)
         items = values.items if isinstance(values, Sequence) else []
-        unlike = 0 < len(items) == len({*map(str, items)})
-        if not unlike or (*way, name)[0] not in SCENE or not isinstance(section, Mapping):
-            wanted = "a key of the scene, such as drop, with a list of unlike values"
-            faults.add(key.place, "plan.vary", f"found {_text(key)}: {values}; accepted: {wanted}")
+        if (*way, name)[0] not in SCENE or not isinstance(section, Mapping):
+            wanted = f"a key of {', '.join(SCENE)}, in a section that the file has"
+        elif section.get(name) is not None:
+            wanted = f"{name} in one place; it is also stated by itself"
+        elif not 0 < len(items) == len({*map(_text, items)} - {""}):
+            wanted = "a list of unlike values"
         else:
-            section.entries[:] = [pair for pair in section.entries if _text(pair[0]) != name]
             entry = ScalarNode(name, plain=True, place=key.place)
-            choices.append([(section.entries, entry, _text(key), item) for item in items])
+            choices.append(
+                [(section.entries, entry, f"{_text(key)} {_text(item)}", item) for item in items]
+            )
+            continue
+        faults.add(key.place, "plan.vary", f"found {key}: {values}; accepted: {wanted}")
     if math.prod(map(len, choices)) > MOST:
-        faults.add(root.place, "plan.vary", f"more than {MOST} settings; give fewer values")
+        faults.add(key.place, "plan.vary", f"more than {MOST} settings; give fewer values")
+    if faults.problems:
         return
     for number, setting in enumerate(product(*choices)):
         for entries, entry, _, value in setting:
             entries[:] = [*(pair for pair in entries if pair[0] is not entry), (entry, value)]
-        words = ", ".join(f"{name} {_text(value) or value}" for _, _, name, value in setting)
-        faults.setting = words * (number > 0)  # what is wrong in the first is so in all
-        yield words
+        words = ", ".join(words for _, _, words, _ in setting)
+        # What is wrong in the first setting is so in all.
+        faults.setting = f" ({words})" if number else ""
+        yield one_line(words, len(words))
 
 
 def _text(node: Node) -> str:
     return node.text if isinstance(node, ScalarNode) else ""
-
-
-def _entries(node: Node | None) -> list[tuple[Node, Node]]:
-    return node.entries if isinstance(node, Mapping) else []
 
 
 def _find(node: Node | None, way: list[str]) -> Node | None:

@@ -149,8 +149,8 @@ def load(text: str, source: str) -> Node:
         # The parser leaks int() and chr() errors of broken escapes and directives.
         index, message = 0, "this file cannot be read; see its quotes, brackets and % lines"
     place = place_at(body, index)
-    below = _excerpt(body, place)
-    raise InputError(problems=[Problem(source, *place, "", message, below)])
+    problem = Problem(source, *place, "", message, _excerpt(body, place))
+    raise InputError(problems=[problem])
 
 
 class _RefusalError(Exception):
@@ -173,16 +173,34 @@ def _excerpt(text: str, place: Place) -> str:
 
 
 class _Composer(yaml.BaseLoader):
-    """PyYAML's composer of nodes, which have a tag only where the file has one."""
+    """PyYAML's composer of nodes, which have a tag only where the file has one; bounded."""
+
+    nodes = depth = 0
 
     def resolve(self, *_: object) -> None:
         """Leave the type of a node to its reader."""
 
     def compose_node(self, *place: Any) -> Any:
         """Compose a node; an anchor may be given again (YAML 1.2, 3.2.2.2)."""
-        if not self.check_event(yaml.AliasEvent):
-            self.anchors.pop(cast("Any", self).peek_event().anchor, None)
-        return super().compose_node(*place)
+        event = cast("Any", self).peek_event()
+        self.nodes += 1
+        _check_size(event, self.nodes, self.depth)
+        if tag := getattr(event, "tag", None):
+            message = f"the tag {quote(tag)} is not accepted; leave it out"
+            raise _RefusalError(event.start_mark.index, message)
+        if not isinstance(event, yaml.AliasEvent):
+            self.anchors.pop(event.anchor, None)
+        self.depth += 1
+        node = super().compose_node(*place)
+        self.depth -= 1
+        return node
+
+
+def _check_size(place: Any, nodes: int, depth: int) -> None:
+    """Raise an error at the event or node that is too many, or too deep."""
+    if nodes > MAX_NODES or depth > MAX_DEPTH:
+        limits = f"{MAX_NODES} values, aliases expanded, or {MAX_DEPTH} levels"
+        raise _RefusalError(place.start_mark.index, f"more than {limits} of brackets or indents")
 
 
 def _compose(text: str) -> Node:
@@ -197,18 +215,14 @@ def _compose(text: str) -> Node:
 
 def _translate(node: Any, numbers: Iterator[int], depth: int) -> Node:
     """Return the tree below a node; `numbers` counts its nodes, those of an alias again."""
-    at, place = node.start_mark.index, Place(node.start_mark.line + 1, node.start_mark.column + 1)
-    if next(numbers) > MAX_NODES:
-        raise _RefusalError(at, f"more than {MAX_NODES} values, aliases expanded")
-    if node.tag is not None:
-        raise _RefusalError(at, f"the tag {quote(node.tag)} is not accepted; leave it out")
+    _check_size(node, next(numbers), depth)
+    place = Place(node.start_mark.line + 1, node.start_mark.column + 1)
     if isinstance(node, yaml.ScalarNode):
         # "\uD800" in double quotes is a lone surrogate, which no file or database accepts.
         if any("\ud800" <= character <= "\udfff" for character in node.value):
-            raise _RefusalError(at, "half of a surrogate pair; write the character itself")
+            message = "half of a surrogate pair; write the character itself"
+            raise _RefusalError(node.start_mark.index, message)
         return ScalarNode(node.value, node.style is None, place)
-    if depth >= MAX_DEPTH:  # or an alias of what is around it
-        raise _RefusalError(at, f"more than {MAX_DEPTH} levels of brackets or indents")
     inner = partial(_translate, numbers=numbers, depth=depth + 1)
     if isinstance(node, yaml.SequenceNode):
         return Sequence(place, [*map(inner, node.value)])

@@ -35,7 +35,7 @@ class RunLine(NamedTuple):
 
 def read_line(line: Mapping[str, Any]) -> RunLine:
     """Take a run from a daemon's state."""
-    fields = {name: line[name] for name in RunLine._fields}
+    fields = {name: line[name] for name in RunLine._fields if name in line}
     return RunLine(**fields | {"reasons": tuple(map(read_record, line["reason_codes"]))})
 
 

@@ -239,8 +239,8 @@ def same_owners(parts: Sequence[SessionPart], *, same_rig: bool | None) -> Share
     Returns
     -------
     dict
-        For ``rig``, ``posts``, ``beams``, ``start``, ``condition`` and each ``chain NAME`` the
-        names of the sessions that share this owner, a list for each group.
+        For each owner of `rig.analysis.owners.statements` the names of the sessions that share it,
+        a list for each group.
     """
     owners: dict[str, dict[tuple[object, str], list[str]]] = {}
     for place, part in enumerate(parts):
@@ -276,8 +276,9 @@ def _pool_means(parts: Sequence[SessionPart]) -> dict[tuple[str, ...], tuple[Inc
     """Return means over all sessions with the same predictions, by their names."""
     scenes: dict[str, list[SessionPart]] = {}
     for part in parts:
-        scene = attrgetter(*SCENE, "initial_speed", "variants")(part.protocol)
-        scenes.setdefault(repr(scene), []).append(part)
+        stated = attrgetter(*SCENE, "gravity", "initial_speed")
+        settings = [(at, stated(scene)) for at, scene in part.protocol.settings.items()]
+        scenes.setdefault(repr(settings), []).append(part)
     return {
         tuple(part.name for part in alike): summarize(
             alike[0].protocol, [run for part in alike for run in part.analysis.runs]

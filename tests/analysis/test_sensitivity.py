@@ -18,7 +18,7 @@ def test_a_prior_moves_results_as_a_protocol_that_states_it_so(monkeypatch):
     monkeypatch.setattr(sensitivity, "_priors", lambda p: {name: priors(p)[name]})
     drops = cases((1, 2, 3, 4), MILD, 3)
     found = analysis(drops)
-    rows = [row for row in prior_sensitivity(found) if row["prior"] == "datum_uncertainty"]
+    rows = [row for row in prior_sensitivity(UNIFORM, found) if row["prior"] == "datum_uncertainty"]
     assert {row["quantity"] for row in rows} == {"separation_m", "speed_m_s"}
     for word, factor in (("wider", FACTOR), ("narrower", 1.0 / FACTOR)):
         other = replace(UNIFORM, gates=replace(UNIFORM.gates, datum_u=0.3e-3 * factor))

@@ -49,7 +49,8 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     falls, rig = hanging(model, desk)
     counting = model.stage is Stage.COUNTDOWN and model.driving
     expected = desk.latest("expected", (protocol, run), lambda: expected_words(protocol, run))
-    facts = f"drop   {protocol.drop.value * 1e3:.0f} mm {protocol.drop_from}\nmodel  {expected}\n"
+    height = f"{protocol.of(run).drop.value * 1e3:.0f} mm {protocol.drop_from}"
+    facts = f"drop   {height}\nmodel  {expected}\n"
     gates = board(protocol, model.indicators, model.now_s, width)
     return Face(
         Content("\n").join([steps(model), _headline(model, run), _action(model)]),
