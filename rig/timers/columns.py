@@ -17,18 +17,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rig.text_rows import read_rows
 from rig.timers import vocabulary
-from rig.timers.moments import TICK_HZ
 from rig.timers.table import Row, RowBlock
-from rig.timers.vocabulary import (
-    POWERS,
-    SYMBOLS,
-    find_label,
-    form,
-    is_number,
-    normal,
-    unit_of,
-    words,
-)
+from rig.timers.vocabulary import POWERS, find_label, form, is_number, normal, unit_of, words
 
 if TYPE_CHECKING:
     from rig.timers.timer_file import TimerFile
@@ -44,8 +34,6 @@ _FORMS = "whole", "bit", "count", "fraction", "stamp"
 """Kinds of cells, beside those that `rig.timers.vocabulary.kinds_of` knows."""
 _NO_ROLES = {"high", "low", "one", "zero", "unknown", "missing", "gate letter"}
 """Of words that say nothing of a column: those of cells, and letters without a number."""
-_COUNTER_BITS = 30, 32
-"""Of counters: those of MicroPython, and of an Arduino."""
 _MOST_OPEN = 3
 """Columns of which several roles are tried."""
 _MANY = 4
@@ -76,10 +64,6 @@ class TimerColumn:
         Which input and which run all its values are of; empty where the heading does not say.
     state
         ``blocked`` or ``clear`` where the heading says what all its times did to the beam.
-    numbered
-        Whether it is one of times side by side: ``t1``, ``Stop 2``.
-    wraps
-        Where a counter of µs or ms may begin anew, ps.
     words
         What two unknown words mean, for which falls decide: the one that begins is ``high``.
     """
@@ -91,15 +75,13 @@ class TimerColumn:
     gate: str = ""
     run: str = ""
     state: str = ""
-    numbered: bool = False
-    wraps: tuple[int, ...] = ()
     words: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def meaning(self) -> str:
         """What it was taken for, in words."""
         meaning = " or ".join(roles()[role][0] for role in self.role.split("|"))
-        meaning += f" in {SYMBOLS[self.power]}" * (self.role == "time")
+        meaning += f" in {vocabulary.SYMBOLS[self.power]}" * (self.role == "time")
         return meaning + "".join(f": {word!r} is high" for word in [*self.words][:1])
 
 
@@ -118,16 +100,12 @@ class Signal(NamedTuple):
         Its states, levels or volts; itself as moments where the heading says what happened.
     run, label
         What the file calls the run and the input; empty where it does not say.
-    run_at, gate_at
-        Columns that say these in each row; far away where there is none.
     """
 
     clock: TimerColumn
     value: TimerColumn
     run: str
     label: str
-    run_at: int
-    gate_at: int
 
 
 def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[TimerColumn]:
@@ -196,7 +174,6 @@ def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
         if all(role == "other" or (role not in there and way.count(role) == 1) for role in way)
     ] or [("setting",) * len(unclear)]
     file.ways = max(file.ways, len(ways))
-    file.is_guess |= len(ways) > 1
     for column, role in zip(unclear, ways[file.way % len(ways)], strict=True):
         column.role = role
     for column in columns:
@@ -207,15 +184,16 @@ def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
 def _read_column(
     block: RowBlock, heading: Row | None, n: int, facts: set[str], cells: Sequence[str]
 ) -> TimerColumn:
-    """Find out what a column is; the rows above its heading, or its cells, may say the unit."""
+    """Find out what a column is; the row below its heading, or its cells, may say the unit."""
     name = heading.cell(n) if heading else ""
     column = TimerColumn(n, name or f"column {n + 1}", run=_heading_label(block, heading, n, "run"))
     prefix, _, rest = name.partition(":")
     if rest.strip() and not find_label(prefix, "gate"):
         column.run, name = column.run or prefix.strip(), rest
     bare = vocabulary.without_accents(name).replace(column.run, "")
-    above = (row.cell(n) for row in reversed(block.headings) if row.has_units)
-    units = list(map(unit_of, (bare, *above, *cells[: "all.timed" in facts])))
+    # Units stand in the heading, or in the row above the data.
+    last = (row.cell(n) for row in block.headings[-1:] if heading and row.line > heading.line)
+    units = list(map(unit_of, (bare, *last, *cells[: "all.timed" in facts])))
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
     is_numbers = form("row of numbers").fullmatch
     numbers = (row.cell(n) for row in block.headings if is_numbers(row.raw))
@@ -242,9 +220,6 @@ def _read_column(
     if column.role in {"time", "elapsed"}:
         column.power = POWERS.get(unit, 0 if "all.stamp" in facts else None)
         column.state = next((state for state in ("clear", "blocked") if state in facts), "")
-        column.numbered = "moment" in facts
-        if {"all.count", "far"} <= facts and column.power in {3, 6}:
-            column.wraps = tuple(2**bits * TICK_HZ // 10**column.power for bits in _COUNTER_BITS)
     if column.role == "edge" and {"pair", "all.state"} & facts == {"pair"}:
         column.words = dict(zip(dict.fromkeys(cells), ("high", "low"), strict=True))
     return column
@@ -302,13 +277,11 @@ def pair_columns(columns: Sequence[TimerColumn]) -> list[Signal]:
     times = [column for column in columns if column.role == "time"]
     # Of columns that say the same times in other units, the finest is kept.
     finest = {_part_of(c): c.power for c in sorted(times, key=lambda c: c.power or 0)}
-    times = [c for c in times if c.numbered or c.power == finest[_part_of(c)]] or counts
+    times = [c for c in times if c.power == finest[_part_of(c)]] or counts
     chosen = next((v for v in VALUES if any(c.role in v for c in columns)), ())
     is_sampled, pairs = chosen == SAMPLED, list[Signal]()
     for clock in times:
         own = [column for column in columns if _clock_of(column, times) is clock]
-        places = {} if is_sampled else {c.role: c.at for c in columns[::-1]}
-        names = places.get("run", _NOWHERE), places.get("gate", _NOWHERE)
         values = [column for column in own if column.role in chosen]
         if not values and not is_sampled:
             values = [replace(clock, at=_NOWHERE, role="moment")]
@@ -317,7 +290,7 @@ def pair_columns(columns: Sequence[TimerColumn]) -> list[Signal]:
             is_beside = is_sampled or len(values) > 1
             label = _label_of(value) if is_beside else clock.gate or value.gate
             label += f" ({n})" if is_sampled and labels[label] > 1 else ""
-            pairs.append(Signal(clock, value, clock.run or value.run, label, *names))
+            pairs.append(Signal(clock, value, clock.run or value.run, label))
     return pairs
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from rig.records import Drop, Edge
 from rig.timers.lines import read_lines
-from rig.timers.moments import TICK_HZ, moment, seconds
+from rig.timers.moments import LONGEST_DROP, TICK_HZ, moment, seconds
 from rig.timers.problems import ProblemList
 from rig.timers.table import Row, split_cells
 from rig.timers.vocabulary import LONGEST, is_remark
@@ -25,15 +25,12 @@ _CELLS: tuple[tuple[str, Callable[[str], Any], str], ...] = (
     (r"[01]", int, "a state: 1 is blocked, 0 is clear"),
 )
 """Of each column: form, how it is read, and what is accepted."""
-_LONGEST_RUN = 3600 * TICK_HZ
-"""Picoseconds: more in a run means a wrong unit or a wrong run."""
 
 
 def is_own(head: Iterable[str]) -> bool:
     """Whether lines begin as the project's own format does, perhaps below remarks."""
     plain = (line[:LONGEST] for line in head if line.strip() and not is_remark(line))
-    first = next(plain, "").lower()
-    return [text.strip() for text in first.split(",")[:2]] == list(HEADER[:2])
+    return tuple(text.strip().lower() for text in next(plain, "").split(",")) == HEADER
 
 
 def read_edges(path: str | Path) -> list[Drop]:
@@ -50,9 +47,7 @@ def read_edges(path: str | Path) -> list[Drop]:
         for number, line in enumerate(read_lines(path), 1)
         if line.strip() and not is_remark(line)
     )
-    heading = next(rows, Row(1, []))
-    if ",".join(heading.texts).lower() != header:
-        problems.refuse(heading.line, 1, "wrong_header", header=header)
+    next(rows, None)  # the header
     runs: dict[int, list[tuple[int, int, bool]]] = {}
     last: dict[tuple[int, int], int] = {}
     for row in rows:
@@ -70,7 +65,7 @@ def read_edges(path: str | Path) -> list[Drop]:
         run, channel, tick, state = cells
         edges = runs.setdefault(run, [])
         first = edges[0][0] if edges else tick
-        begin, end = last.get((run, channel), first - _LONGEST_RUN), first + _LONGEST_RUN
+        begin, end = last.get((run, channel), first - LONGEST_DROP), first + LONGEST_DROP
         if not begin <= tick <= end:
             since, until = (seconds(bound, Fraction(TICK_HZ)) for bound in (begin, end))
             accepted = f"a time from {since} s (the last of channel {channel}) to {until} s"

@@ -11,7 +11,6 @@ import math
 from argparse import Namespace
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,7 +20,7 @@ from rig.records import Drop
 from rig.timers.edge_rows import HEADER, is_own, read_edges
 from rig.timers.layouts import SETTINGS, FileReading, find_layouts, input_names
 from rig.timers.lines import read_lines
-from rig.timers.moments import LONGEST_S, TICK_HZ
+from rig.timers.moments import LONGEST_DROP, TICK_HZ
 from rig.timers.problems import refusal
 from rig.timers.timer_file import TimerFile, read_file
 from rig.timers.vocabulary import POWERS, form
@@ -35,8 +34,6 @@ _GOOD_GUESS = 0.95
 _DECISIVE = 7.0
 """Logarithm of the odds beyond which a reading is taken without a question: 1,000 to 1."""
 _FINALISTS = 6
-_LONGEST = LONGEST_S * TICK_HZ
-"""Picoseconds that a drop may last."""
 _COARSE = 10**8
 """Picoseconds: times in whole tenths of milliseconds may be those of two falls by chance."""
 _FEWEST_SAME = 3
@@ -139,8 +136,7 @@ def _find_readings(
 ) -> tuple[list[FileReading], dict[str, Any]]:
     """Return every reading of a file that has drops, and what options decide."""
     readings, faults, stated = list[FileReading](), list[InputError](), dict[str, Any]()
-    way, ways = 0, 1
-    while way < ways:
+    for way in itertools.count():
         file = TimerFile(options.events, way)
         try:
             read_file(file)
@@ -149,7 +145,8 @@ def _find_readings(
             readings += [reading for reading in possible if reading.runs]
         except InputError as error:
             faults.append(error)
-        way, ways = way + 1, file.ways
+        if way + 1 >= file.ways:
+            break
     if not readings:
         if faults:
             raise faults[0]
@@ -157,11 +154,11 @@ def _find_readings(
         values = {"inputs": ", ".join(file.labels), "channels": ", ".join(map(str, gates))}
         raise refusal(options.events, "inputs_unclear", **values, pairs=pairs)
     shortest = min(readings, key=lambda reading: max(reading.lasting))
-    if max(shortest.lasting) > _LONGEST:
-        limit = {"lasting_s": max(shortest.lasting) / TICK_HZ, "limit_s": LONGEST_S}
+    if max(shortest.lasting) > LONGEST_DROP:
+        limit = {"lasting_s": max(shortest.lasting) / TICK_HZ, "limit_s": LONGEST_DROP / TICK_HZ}
         place = f"{options.events}:{shortest.line[shortest.tick.argmax()]}:1"
         raise refusal(place, "too_long", recording="a drop", **limit)
-    return [reading for reading in readings if max(reading.lasting) <= _LONGEST], stated
+    return [reading for reading in readings if max(reading.lasting) <= LONGEST_DROP], stated
 
 
 def _choose(
@@ -176,15 +173,14 @@ def _choose(
     distinct = [*{x.key: x for x in reversed(readings)}.values()][::-1]
     if len(distinct) == 1 and "channels" in stated:
         return distinct[0], fit(distinct[0], True)
-    good = _GOOD_GUESS if any(x.file.is_guess for x in distinct) else _GOOD
+    good = _GOOD_GUESS if any(x.file.is_guess or x.file.ways > 1 for x in distinct) else _GOOD
     rough = sorted(((fit(x, False), x) for x in distinct), key=lambda row: -row[0].share)
     likely = [x for match, x in rough if match.share >= good]
     exact = [(fit(x, True), x) for x in likely[:_FINALISTS]]
+    contrary = "" if "dark" in stated else "inverted"
+    ranked = [row for row in exact if row[0].share >= good and row[1].layout.dark != contrary]
     # The first row of a log of changes is the state at the beginning, unless falls say that.
-    prior = {"state": 0.0, "change": -_DECISIVE}
-    ranked = [row for row in exact if row[0].share >= good]
-    ranked = [row for row in ranked if row[1].layout.dark != "inverted" or "dark" in stated]
-    ranked.sort(key=lambda row: -row[0].evidence - prior[row[1].layout.first])
+    ranked.sort(key=lambda row: _DECISIVE * (row[1].layout.first == "change") - row[0].evidence)
     if not ranked:
         match, best = (exact or rough)[0]
         is_open = [x for _, x in rough if x.layout.dark not in {"states", "inverted"}]
@@ -217,9 +213,9 @@ def _refuse_impossible(reading: FileReading, place: str, *, is_stated: bool) -> 
         moments: set[object] = {drop.edges} if is_coarse else {*drop.edges}
         same = Counter(earlier[moment] for moment in moments & earlier.keys())
         earlier |= dict.fromkeys(moments, drop.run)
-        run, count = max(same.items(), key=itemgetter(1), default=(0, 0))
-        if count and count >= min(len(moments), max(_FEWEST_SAME, 1 + len(moments) // 2)):
-            raise refusal(place, "same_twice", run=drop.run, other=run)
+        for run, count in same.most_common(1):
+            if count >= min(len(moments), max(_FEWEST_SAME, 1 + len(moments) // 2)):
+                raise refusal(place, "same_twice", run=drop.run, other=run)
     # Of changes alone, two in a row mean that the row of the first is missing.
     changes = Counter(zip(reading.line.tolist(), reading.tick, strict=True))
     lines = [line for (line, _), count in changes.items() if count > 1]
@@ -283,9 +279,10 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
     texts |= {"--map": options.map} if options.map is not None else {}
     settings = {*SETTINGS}.difference(labels)
     for place, text in texts.items():
-        channels, pairs = dict[str, int](), form("assigned").findall(text) or [(text, "")]
-        for name, value in sorted(pairs, key=lambda pair: pair[0] not in settings):
-            inputs = {x or "input": x for x in input_names(file, stated.get("groups"), gates)}
+        channels, pairs = dict[str, int](), dict(form("assigned").findall(text) or [(text, "")])
+        groups = pairs.get("groups", stated.get("groups"))
+        inputs = {x or "input": x for x in input_names(file, groups, gates)}
+        for name, value in pairs.items():
             if name in settings and form(f"setting {name}").fullmatch(value):
                 stated[name] = value
             elif name in settings:

@@ -22,8 +22,8 @@ from rig.timers.signals import STATES, Changes
 from rig.timers.timer_file import TimerFile
 from rig.timers.vocabulary import POWERS, number_of
 
-_LONGEST_S = 60
-"""A drop lasts half a second, and nobody waits a minute until it is recorded."""
+_LONGEST = 60 * TICK_HZ
+"""Picoseconds: a drop lasts half a second, and nobody waits a minute until it is recorded."""
 _CLEAR_PAUSE = 3.0
 _MOST_MAPS = 200
 
@@ -75,7 +75,7 @@ class FileLayout:
 
 
 class FileReading:
-    """Edges as a layout of a file gives them, run by run; runs without a number come last.
+    """Edges as a layout of a file gives them, run by run; runs without a number have a free one.
 
     Attributes
     ----------
@@ -120,10 +120,11 @@ class FileReading:
         self.dropped = {*changes["line"][is_change & ~is_edge].tolist()}
         drops, first, places = np.unique(drop[is_edge], return_index=True, return_inverse=True)
         runs = numbers[drops]
-        runs = np.where(runs > 0, runs, runs.max(initial=0) + np.cumsum(runs == 0))
-        names = np.array([*file.names])[changes["run"][is_edge][first]]
-        called = zip(names.tolist(), runs.tolist(), strict=True)
-        self.renamed = {name: n for name, n in called if name and number_of(name) != n}
+        free = np.setdiff1d(np.arange(1, 1 + 2 * len(runs)), runs)
+        runs[runs == 0] = free[: np.sum(runs == 0)]
+        names = np.array([*file.names])[changes["run"][is_edge][first]].tolist()
+        called = zip(names, runs.tolist(), strict=True) if any(names) else ()
+        self.renamed = {x or "one without a name": n for x, n in called if number_of(x) != n}
         runs = runs[places]
         order = np.flatnonzero(is_edge)[np.argsort(runs, kind="stable")]
         self.line, self.tick = changes["line"][order], changes["tick"][order]
@@ -257,13 +258,12 @@ def _pauses(file: TimerFile, unit: str, groups: str) -> list[float]:
     of half a second or more that is three times as long as the one before.
     """
     changes, drop, _ = group_changes(file, unit, groups, 0.0)
-    ticks, is_same = changes["tick"], np.diff(drop) == 0
-    pauses = sorted(np.diff(ticks)[is_same].tolist()) if not file.has_runs else []
-    for before, pause in itertools.pairwise(pauses):
-        if pause >= max(_CLEAR_PAUSE * before, TICK_HZ / 2):
-            is_long = not np.any(drop) and ticks[-1] - ticks[0] > _LONGEST_S * TICK_HZ
-            return [0.0, pause / TICK_HZ][is_long:]
-    return [0.0]
+    is_same = (np.diff(drop) == 0) & (not file.has_runs)
+    pauses = np.sort(np.diff(changes["tick"])[is_same])
+    is_clear = pauses[1:] >= np.maximum(_CLEAR_PAUSE * pauses[:-1], TICK_HZ / 2)
+    choices = [0.0, *(pauses[1:][is_clear] / TICK_HZ).tolist()[:1]]
+    is_long = not np.any(drop) and sum(pauses) > _LONGEST
+    return choices[-1:] if is_long else choices
 
 
 def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list[dict[str, int]]:
@@ -280,7 +280,10 @@ def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list
     later = file.changes[~file.changes["first"]][::-1]
     first = dict(zip(later["label"].tolist(), later["tick"], strict=True))
     passed = sorted(labels, key=lambda label: first.get(file.names[label], 0))
-    chosen = [*itertools.combinations(gates, len(labels))][:_MOST_MAPS]
-    maps = [dict(zip(labels, sorted(beams), strict=True)) for beams in chosen[:1]]
-    maps += [x for beams in chosen if (x := dict(zip(passed, beams, strict=True))) != maps[0]]
+    chosen = itertools.islice(itertools.combinations(gates, len(labels)), _MOST_MAPS)
+    maps = [
+        dict(zip(names, channels, strict=True))
+        for beams in chosen
+        for names, channels in ((labels, sorted(beams)), (passed, beams))
+    ]
     return maps or [by_number] * bool(by_number)

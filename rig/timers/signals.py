@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rig.reasons import make_reason
 from rig.timers.columns import SAMPLED, TimerColumn, columns_of, pair_columns, roles
 from rig.timers.crossings import find_crossings, find_threshold
-from rig.timers.moments import TICK_HZ, moment
+from rig.timers.moments import OVERFLOWS_PS, TICK_HZ, moment
 from rig.timers.table import Row
 from rig.timers.vocabulary import is_number, state_of
 
@@ -73,22 +73,21 @@ class SignalReader:
         filled = {x.at: sum(row.cell(x.at) != "" for row in sample) for x in columns}
         total = sum(filled[at] for at in values)
         is_filled = len(values) == 1 or 2 * total >= (len(values) + 1) * len(sample)
-        self.has_times = "time" in used
-        self.has_names = not used.isdisjoint({"gate", "run"}) or bool(values)
-        named = {at for x in self.signals for at in x[-2:]}
-        self.above = {at: "" for at in named & filled.keys() if 2 * filled[at] <= len(sample)}
-        file.is_guess |= bool(self.above)
+        named = [x for x in columns[::-1] if x.role in {"run", "gate"} and "volts" not in used]
+        self.places = {x.role: x.at for x in named}
+        self.above = {x: "" for x, at in self.places.items() if 2 * filled[at] <= len(sample)}
         self.is_sampled = "volts" in used or ("level" in used and is_filled)
         self.is_whole = is_filled and (self.is_sampled or len(values) > len(self.clocks))
-        needed = {at for x in self.signals for at in (x.clock.at, x.value.at, *x[-2:])}
+        needed = {x.at for signal in self.signals for x in signal[:2]} | {*self.places.values()}
         unused = (x.name for x in columns if x.role != "index" and x.at not in needed)
         self.unused = ", ".join(unused)
         file.notes += [make_reason("columns_unused", columns=self.unused)] if self.unused else []
         file.lines += [f"  {column.name}: {column.meaning}" for column in columns]
-        runs = [clock.run for clock in self.clocks]
         file.is_sampled |= self.is_sampled
-        file.is_wide |= not self.is_sampled and len(runs) > 1 and not any(runs)
-        file.has_runs |= "run" in used and not self.is_sampled
+        is_named = any(clock.run for clock in self.clocks)
+        file.is_wide |= len(self.clocks) > 1 and not (self.is_sampled or is_named)
+        file.is_guess |= bool(self.above)
+        file.has_runs |= "run" in self.places
 
     def read(self, rows: Iterator[Row]) -> list[Changes]:
         """Return the changes that rows say; a row may say that nothing changes, or be unread.
@@ -96,7 +95,7 @@ class SignalReader:
         Rows of samples without times are at a stated rate.
         """
         file, first = self.file, next(rows)
-        base = (0.0, 1.0) if self.has_times else first.block.find_time_base()
+        base = (0.0, 1.0) if self.clocks[0].role == "time" else first.block.find_time_base()
         if base is None:
             file.problems.refuse(first.line, 1, "no_rate", lacks="a column of times or a rate")
         self.base, self.count = base, 0
@@ -117,7 +116,7 @@ class SignalReader:
             if len(self.changes) > MAX_EVENTS:
                 file.problems.refuse(row.line, 1, "too_many_events", limit=MAX_EVENTS)
         file.rows += self.count
-        if self.unused and not self.has_names:
+        if self.unused and not self.places and self.signals[0].value.role == "moment":
             steps = [b[1] - a[1] for a, b in itertools.pairwise(self.changes)]
             if len(steps) > 3 and max(steps) < 1.5 * min(steps):
                 file.problems.refuse(first.line, 1, "regular_samples", columns=self.unused)
@@ -137,13 +136,10 @@ class SignalReader:
             if text:
                 self._reject(row, clock, text)
             return None
-        # Of another input's row nothing is said; telephones fill up with zeros.
-        if tick == 0 and clock.numbered and clock is not self.clocks[0]:
-            return None
         if clock.role != "time":
             tick = round(self.base[0] * TICK_HZ + self.base[1] * tick)
         latest = self.latest.get(clock.at, tick)
-        for wrap in clock.wraps if tick < latest else ():
+        for wrap in OVERFLOWS_PS.get(clock.power, ()) if tick < latest else ():
             pause = (tick - latest) % wrap
             tick = latest + pause if pause < _TURN else tick
         if self.is_sampled and tick < latest:
@@ -164,26 +160,27 @@ class SignalReader:
         if state == _REJECTED:
             self._reject(row, value, word)
         elif state or not self.is_sampled:
-            run = names.setdefault(self._read_name(row, signal.run_at) or signal.run, len(names))
-            before, self.values[n] = self.values.get(n), (state, run, block.number)
+            name = self._read_name(row, "run") or signal.run or block.run
+            run = names.setdefault(name, len(names))
+            before, self.values[n] = self.values.get(n), (state, run)
             if self.is_whole and before == self.values[n]:
                 return
-            label = self._read_name(row, signal.gate_at) or signal.label or block.gate
-            key = n, block.number, run, names.setdefault(label, len(names))
+            label = self._read_name(row, "gate") or signal.label or block.gate
+            key = n, run, names.setdefault(label, len(names))
             # A first row may be the state at the beginning of a run, and no change.
             is_first = self.is_whole and key not in self.keys
             self.keys.add(key)
-            clock = 0 if signal.clock.numbered or signal.label else signal.clock.at
+            at = signal.clock.at
             self.changes.append(
-                (row.line, tick, 0, state, key[-1], run, clock, block.number, is_first)
+                (row.line, tick, 0, state, key[-1], run, at, block.number, is_first)
             )
 
-    def _read_name(self, row: Row, at: int) -> str:
+    def _read_name(self, row: Row, role: str) -> str:
         """Return what a row says of its run or gate; of merged cells only the first has a text."""
-        if at not in self.above:
-            return row.cell(at)
-        self.above[at] = row.cell(at) or self.above[at]
-        return self.above[at]
+        text = row.cell(self.places[role]) if role in self.places else ""
+        if role in self.above:
+            text = self.above[role] = text or self.above[role]
+        return text
 
     def _find_crossings(self, n: int) -> Changes:
         """Return where volts cross the middle; note how many do, or that nothing passes."""

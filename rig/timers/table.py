@@ -29,7 +29,8 @@ _COLUMN_ROLES = {
 }
 _UNFILLED = {"setting", "index", "derived"}
 """Roles of columns that may have a name and no values: a rate, comments, or distances."""
-_PREFIXES = {"k": 3, "m": 6, "g": 9}
+_UNITS = vocabulary.POWERS | {"khz": -3, "mhz": -6, "ghz": -9}
+"""Decimal power from seconds, or from hertz."""
 _JUDGED = 100
 """Lines in which values are counted."""
 _SAMPLE = 500
@@ -47,7 +48,7 @@ class RowBlock:
     above
         Headings of the block before.
     number
-        How many are before it, but for those of other gates in the same run.
+        How many are before it that have no mark of a run or of a gate.
     run, gate
         Which all its rows are of; empty where no mark says so.
     headings
@@ -104,10 +105,9 @@ class RowBlock:
                 quantity = next(filter(None, map(form("quantity").fullmatch, places)), None)
                 role = next((x for x in ("rate", "start", "step") if x in roles_in(name)), "")
                 if role and quantity:
-                    number, prefix, unit = quantity.groups("")
-                    power = vocabulary.POWERS.get(vocabulary.unit_of(unit.lower()), 0)
-                    power = _PREFIXES.get(prefix.lower(), 0) - power
-                    stated.setdefault(role, float(number.replace(",", ".")) * 10.0**power)
+                    number, unit = quantity[1].replace(",", "."), quantity[2].lower()
+                    power = _UNITS.get(vocabulary.unit_of(unit) or unit, 0)
+                    stated.setdefault(role, float(number) / 10.0**power)
         step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
         return (stated.get("start", 0.0), step) if step else None
 
@@ -144,15 +144,6 @@ class Row(NamedTuple):
         text = vocabulary.normal(" ".join(self.texts)).strip("-=*#:<>[] ")
         return form("mark").fullmatch(text) is not None
 
-    @property
-    def has_units(self) -> bool:
-        """Whether it has units only, perhaps behind their name: ``Y_Unit_Label``."""
-        texts = [vocabulary.normal(text.strip("()[]- ")) for text in self.texts]
-        texts = list(filter(None, texts))
-        is_unit = [form("unit").fullmatch(text) is not None for text in texts]
-        is_named = form("name of units").match("".join(texts[:1])) is not None
-        return bool(texts) and all(is_unit[1:]) and (is_unit[0] or is_named)
-
     def place(self, at: int) -> tuple[int, int]:
         """Return the line, and the column, from 1, at which a cell begins; 1 without the cell."""
         if at >= len(self.texts):
@@ -184,7 +175,6 @@ class Table:
 
     def __init__(self, lines: Iterable[tuple[int, str]]) -> None:
         self.remarks, self.strays = list[Row](), list[Row]()
-        self._parts = dict[tuple[str, str], int]()
         unwrapped = (pair for number, line in lines for pair in _unwrap(number, line))
         sample = list(itertools.islice(unwrapped, _SAMPLE))
         self._lines = itertools.chain(sample, unwrapped)
@@ -197,20 +187,12 @@ class Table:
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
 
-    def split(self, line: str, *, is_plain: bool = False) -> list[str]:
-        """Split a line into cells; numbers get a decimal point, and what is missing is empty.
-
-        Parameters
-        ----------
-        is_plain
-            Whether it has only numbers and what parts them.
-        """
+    def split(self, line: str) -> list[str]:
+        """Split a line into cells; numbers get a decimal point, and what is missing is empty."""
         if not self.separator:
             values = dict(_named_values(line))
             return [values.get(name, "") for name in self._names] if values else [line]
         cells = split_cells(line, self.separator, len(self._usual))
-        if is_plain and (self.separator == "," or "," not in line):
-            return cells
         missing, has_comma = vocabulary.words()["missing"], form("decimal comma").fullmatch
         cells = ["" if text[:5].casefold() in missing else text for text in cells]
         return [text.replace(",", ".") if has_comma(text[:LONGEST]) else text for text in cells]
@@ -224,7 +206,7 @@ class Table:
             if not line.strip():
                 continue
             if block.width and is_plain(line):  # as most
-                yield Row(number, self.split(line, is_plain=True), line, block)
+                yield Row(number, self.split(line), line, block)
                 continue
             mark = form("remark").match(line[:LONGEST])
             text = line[mark.end() :].rstrip('" ') if mark else line
@@ -244,17 +226,12 @@ class Table:
                 (self.strays if block.width else block.headings).append(row)
 
     def _next_block(self, last: RowBlock, mark: str) -> RowBlock:
-        """Return the block below a mark; what marks below each other say holds together."""
+        """Return the block below a mark; a run or gate goes on until a mark names another."""
         run, gate = vocabulary.find_label(mark, "run"), vocabulary.find_label(mark, "gate")
-        number = last.number + (not gate or bool(run))
-        if not last.width:
-            run, gate = run or last.run, gate or last.gate
-        if run and (run, gate) not in self._parts:
-            # Parts of a run may be those of its gates.
-            number = next((n for (name, _), n in self._parts.items() if name == run), number)
-            self._parts[run, gate] = number
+        number = last.number + (not run and not gate)
         above = last.headings if last.width else [*last.above, *last.headings]
-        return RowBlock(self.remarks, above[:_SAMPLE], number, run, gate)
+        above = above[:_SAMPLE]
+        return RowBlock(self.remarks, above, number, run or last.run, gate or last.gate)
 
     def _begins_block(self, row: Row) -> bool:
         """Whether a row below others is a mark, or a heading, of further ones."""
@@ -332,13 +309,10 @@ def find_separator(lines: Sequence[str], named: int) -> str:
     named
         How many values stand between words; where most do, nothing else is between them.
     """
-    rows = [line[:1000] for line in lines if re.search("[0-9]", line[:1000])][-_JUDGED:]
+    rows = [line[:1000].strip() for line in lines if re.search("[0-9]", line[:1000])][-_JUDGED:]
     is_named = any(re.search("[A-Za-z][A-Za-z0-9]", line) and "," in line for line in lines[:200])
-    numbers = [
-        row.strip().replace(",", ".")
-        for row in rows
-        if form("decimal comma").fullmatch(row.strip())
-    ]
+    has_comma = form("decimal comma").fullmatch
+    numbers = [row.replace(",", ".") for row in rows if has_comma(row)]
     if 2 * len(numbers) > len(rows) and not is_named and sorted(numbers, key=float) == numbers:
         return ";"  # times go on with decimal commas; 0,25 below 1,5 is no decimal comma
     counts = {"": (named, 0)} if named else {}

@@ -55,7 +55,7 @@ class TimerFile:
     is_wide
         Whether a row has several times, so that it may be a run.
     is_guess
-        Whether falls decide which columns are used, or rows lack the name of their run or gate.
+        Whether rows lack the name of their run or gate, so that falls decide.
     has_runs
         Whether rows say their run, which may go on in another block.
     rows
@@ -141,7 +141,5 @@ def _read_rows(
     block = sample[0].block
     if block.key not in readers:
         readers[block.key] = SignalReader(file, [row for row in sample if row.block is block])
-    reader = readers[block.key]
-    number = attrgetter("block.number") if reader.is_sampled else bool
-    for _, capture in itertools.groupby(itertools.chain(sample, rows), number):
-        yield from reader.read(capture)
+    for _, capture in itertools.groupby(itertools.chain(sample, rows), attrgetter("block.number")):
+        yield from readers[block.key].read(capture)

@@ -34,12 +34,11 @@ def form(name: str) -> re.Pattern[str]:
 
 @cache
 def _expand(name: str) -> str:
-    forms, role = dict(read_rows(__file__, "forms.txt", " ; ")), name.removeprefix("long ")
-    if name in forms or role not in words():
-        within = forms.get(name, name)
-        return re.sub("<([a-z ]+)>", lambda match: f"(?:{_expand(match[1])})", within)
-    known = (word for word in words()[role] if role == name or len(word) > 2)
-    return f"(?i:{'|'.join(sorted(map(re.escape, known), key=len, reverse=True))})"
+    if name in words():
+        known = sorted(map(re.escape, words()[name]), key=len, reverse=True)
+        return f"(?i:{'|'.join(known)})"
+    within = dict(read_rows(__file__, "forms.txt", " ; ")).get(name, name)
+    return re.sub("<([a-z ]+)>", lambda match: f"(?:{_expand(match[1])})", within)
 
 
 def without_accents(text: str) -> str:

@@ -103,7 +103,7 @@ def test_own_files_are_told_from_others(tmp_path):
     for text, ours in [
         ("run,channel,time_s,state\n", True),
         ("# remark\n Run , channel,time_s, state\n", True),
-        ("run,channel,time,state\n1,0,0.1,1\n", True),
+        ("run,channel,time,state\n1,0,0.1,1\n", False),
         ("time,voltage\n0,1\n", False),
         ("", False),
         (VERNIER, False),
