@@ -28,14 +28,13 @@ for setting in [name for name in os.environ if name.startswith("PYTHON")]:
     del os.environ[setting]
 sys.dont_write_bytecode = False
 
-_BY_THE_CLOCK = tuple(
-    Path(__file__).parent / name
-    for name in (
-        "daemon", "doctor", "flash", "selftest", "tui", "cli/test_ctrl_c.py", "cli/test_errors.py",
-        "cli/test_resume.py", "cli/test_run.py", "cli/test_unfired.py",
-    )
+_ORDER = (
+    "cli/test_resume.py", "tui/", "daemon/", "flash/", "selftest/", "doctor/", "cli/test_run.py",
+    "cli/test_unfired.py", "cli/test_errors.py", "cli/test_ctrl_c.py",
+    "",
+    "firmware/test_pico", "timers/test_import_shapes.py", "scenes/", "test_readme.py",
 )  # fmt: skip
-"""Tests of what goes by a clock of its own."""
+"""From what goes by a clock of its own, and mostly waits, to what computes longest."""
 
 
 def pytest_configure() -> None:
@@ -78,27 +77,38 @@ def pytest_report_teststatus(report: pytest.TestReport) -> Iterator[object]:
     return category, letter, word
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Have every worker begin with what goes by the clock, and only then compute.
+def _computes(worker: str) -> bool:
+    """Say whether a worker (``gw0``, ``gw1`` ...) begins with tests that compute."""
+    return int(worker.removeprefix("gw")) < (os.cpu_count() or 1)
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Have a worker that computes step back for those that wait.
 
     A board that is not heard of for a quarter of a second disarms itself, as it should: beside
-    tests that need all processors that is no rare event. Those that wait are good neighbours.
+    tests that need all processors that is no rare event.
     """
-    workers = getattr(config, "workerinput", {}).get("workercount", 1)
-    waiting: list[pytest.Item] = []
-    computing: list[pytest.Item] = []
-    clocked = {
-        path: any(map(path.is_relative_to, _BY_THE_CLOCK)) for path in {i.path for i in items}
-    }
-    for one in items:
-        (waiting if clocked[one.path] else computing).append(one)
+    worker = os.environ.get("PYTEST_XDIST_WORKER")
+    if worker and _computes(worker):
+        os.nice(5)
 
-    def share(of: list[pytest.Item], number: int) -> list[pytest.Item]:
-        return of[len(of) * number // workers : len(of) * (number + 1) // workers]
 
-    items[:] = [
-        one for number in range(workers) for of in (waiting, computing) for one in share(of, number)
-    ]
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> object:
+    """Hand out whole files: what computes longest to those that compute, what waits to others."""
+    from xdist.scheduler import LoadFileScheduling
+
+    def rank(file: str) -> int:
+        name = file.removeprefix("tests/")
+        return _ORDER.index(max(filter(name.startswith, _ORDER), key=len))
+
+    class Scheduler(LoadFileScheduling):
+        def _assign_work_unit(self, node) -> None:
+            choose = max if _computes(node.gateway.id) else min
+            self.workqueue.move_to_end(choose(self.workqueue, key=rank), last=False)
+            super()._assign_work_unit(node)
+
+    return Scheduler(config, log)
 
 
 @pytest.fixture

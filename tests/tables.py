@@ -12,7 +12,8 @@ PROTOCOLS = Path(__file__).with_name("protocols")
 @cache
 def read_table(folder_of: str, name: str):
     """Read a table that lies beside a module."""
-    return yaml.safe_load(Path(folder_of).with_name(f"{name}.yaml").read_text("utf-8"))
+    text = Path(folder_of).with_name(f"{name}.yaml").read_text("utf-8")
+    return yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
 
 
 def cases(test):

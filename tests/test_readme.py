@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 from rig.cli import _parser
-from tests.once import filled_once
 from tests.tables import read_table
 
 ROOT = Path(__file__).parents[1]
@@ -50,22 +49,20 @@ for line in sys.argv[1:]:
 """Commands one after the other: what each has to load takes longer than most of them."""
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def installed(tmp_path_factory):
     """An environment with the wheel in it, outside the clone; other packages are the tests' own."""
-
-    def fill(folder):
-        pip = [sys.executable, "-m", "pip", "--disable-pip-version-check"]
-        wheels, environment = folder / "wheels", folder / "environment"
-        subprocess.run([*pip, "wheel", "-q", "--no-deps", "-w", wheels, ROOT], check=True)
-        subprocess.run([sys.executable, "-m", "venv", "--without-pip", environment], check=True)
-        (wheel,) = wheels.iterdir()
-        python = environment / "bin/python"
-        subprocess.run([*pip, "--python", python, "install", "-q", "--no-deps", wheel], check=True)
-        paths = sysconfig.get_paths(vars={"base": str(environment), "platbase": str(environment)})
-        (Path(paths["purelib"]) / "others.pth").write_text(f"{sysconfig.get_paths()['purelib']}\n")
-
-    return filled_once(tmp_path_factory, "installed", fill) / "environment"
+    folder = tmp_path_factory.mktemp("installed")
+    pip = [sys.executable, "-m", "pip", "--disable-pip-version-check"]
+    wheels, environment = folder / "wheels", folder / "environment"
+    subprocess.run([*pip, "wheel", "-q", "--no-deps", "-w", wheels, ROOT], check=True)
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", environment], check=True)
+    (wheel,) = wheels.iterdir()
+    python = environment / "bin/python"
+    subprocess.run([*pip, "--python", python, "install", "-q", "--no-deps", wheel], check=True)
+    paths = sysconfig.get_paths(vars={"base": str(environment), "platbase": str(environment)})
+    (Path(paths["purelib"]) / "others.pth").write_text(f"{sysconfig.get_paths()['purelib']}\n")
+    return environment
 
 
 def carry_out(folder, installed, first, *more):
@@ -86,14 +83,19 @@ def carry_out(folder, installed, first, *more):
     return said
 
 
+@pytest.fixture(scope="module")
+def chains(tmp_path_factory, installed):
+    """A folder in which the reader has drafted two chains, as most pages begin."""
+    folder = tmp_path_factory.mktemp("chains")
+    carry_out(folder, installed, CHAINS)
+    return folder
+
+
 @pytest.fixture
-def reader(page, tmp_path, tmp_path_factory, installed):
+def reader(page, tmp_path, chains, installed):
     """Return a folder in which the reader of a page has done what comes before it."""
     before = BEFORE.get(page.name, ())
-    if before[:1] == [CHAINS]:  # as most do
-        chains = filled_once(
-            tmp_path_factory, "chains", lambda folder: carry_out(folder, installed, CHAINS)
-        )
+    if before[:1] == [CHAINS]:
         shutil.copytree(chains, tmp_path, dirs_exist_ok=True)
         before = before[1:]
     if before:

@@ -11,6 +11,7 @@ import json
 import socket
 import struct
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import Future, wait
 from contextlib import ExitStack, nullcontext, suppress
@@ -33,6 +34,8 @@ from rig.session.store import Session
 HELLO_S = 10.0
 """How long a client waits for the answer to `hello`."""
 _REACH_S = 5.0  # until the daemon takes a new client
+_HEED_S = 0.25
+"""A signal just before the main thread waits does not wake it: it wakes by itself, this often."""
 _ANSWER_S = 100.0  # everything but waiting is over by then, a recording too, or the daemon hangs
 _BEAT_S = LEASE_S / 4
 
@@ -354,8 +357,10 @@ def _message_of(line: bytes) -> dict[str, Any]:
 
 
 def _result(answer: Future[Any], patience_s: float, silent: RigError) -> Any:
-    if wait([answer], patience_s).not_done:
-        raise silent
+    end = time.monotonic() + patience_s
+    while wait([answer], min(patience_s, _HEED_S)).not_done:
+        if time.monotonic() >= end:
+            raise silent
     return answer.result()
 
 

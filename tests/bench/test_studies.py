@@ -154,9 +154,6 @@ def test_the_command_leaves_page_and_table(tmp_path, monkeypatch, capsys, here):
         assert row["p_below_0.01"] == 0.0
 
 
-pytestmark = pytest.mark.usefixtures("loops_compiled")
-
-
 def ensemble(incline: float):
     times = [n / 960 for n in range(20)]
     track = {

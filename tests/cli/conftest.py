@@ -71,18 +71,6 @@ def analysis(finished: Finished, tmp_path_factory: pytest.TempPathFactory) -> di
     return json.loads((folder / "said.json").read_text("utf-8"))
 
 
-@pytest.fixture(scope="session")
-def page(finished: Finished, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return what ``rig report`` writes of the finished session."""
-
-    def fill(folder: Path) -> None:
-        path = folder / "alone" / "report.html"
-        path.parent.mkdir()
-        assert rig("report", finished.session, "-o", path) == (0, "", f"report: {path}\n")
-
-    return filled_once(tmp_path_factory, "page", fill) / "alone" / "report.html"
-
-
 @pytest.fixture
 def protocol(tmp_path: Path) -> Path:
     """Write a protocol of two runs: at 40° and at 60°."""

@@ -7,9 +7,18 @@ from unittest.mock import Mock
 import pytest
 
 from rig.session.store import Session
+from tests.cli.lab import rig
 from tests.tables import cases
 
 pytestmark = pytest.mark.usefixtures("analysed_once")
+
+
+@pytest.fixture(scope="module")
+def page(finished, tmp_path_factory):
+    """Return what ``rig report`` writes of the finished session."""
+    path = tmp_path_factory.mktemp("alone") / "report.html"
+    assert rig("report", finished.session, "-o", path) == (0, "", f"report: {path}\n")
+    return path
 
 
 def test_the_report_is_one_page_that_loads_nothing(page):

@@ -13,7 +13,7 @@ from pathlib import Path
 from rig.link import messages as wire
 from rig.link.frames import Decoder
 from sim.interfaces import Lab
-from tests.firmware.toolchain import FIRMWARE, make
+from tests.firmware.toolchain import make
 
 HZ = 16_000_000
 BYTE_TICKS = 320
@@ -24,8 +24,7 @@ _TURN_TICKS = 200
 def build(streams: bool = False) -> Path:
     """Compile the core with the undefined-behaviour sanitizer in it."""
     name = "core-streams.so" if streams else "core.so"
-    make(f"build/host/{name}")
-    return FIRMWARE / "build/host" / name
+    return make(f"build/host/{name}")
 
 
 def load(library: Path) -> ctypes.CDLL:

@@ -1,5 +1,7 @@
 """Both AVR boards' real binaries in the emulator: the suite, stamps, release, wires and name."""
 
+from pathlib import Path
+
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
@@ -12,7 +14,7 @@ from rig_emulator.board import EmulatedBoard
 from rig_emulator.name import NAME_AT
 from rig_emulator.protocol_emu import EmulatedSerial
 from rig_emulator.stand import Flip, Stand
-from rig_emulator.wiring import BOARDS
+from rig_emulator.wiring import BOARDS, Wiring
 from sim.dials import read_dials
 from sim.lab import ChainLab
 from tests.firmware.toolchain import FIRMWARE, make
@@ -22,6 +24,10 @@ from tests.link.conformance import DeviceConformance
 _TURN_TICKS = 1 << 16
 
 
+def image_for(wiring: Wiring) -> Path:
+    return make(f"build/{wiring.mcu}/firmware.elf")
+
+
 class AvrBench(VirtualBench):
     serial_type = EmulatedSerial
     touch_s = 1e-3
@@ -29,10 +35,8 @@ class AvrBench(VirtualBench):
 
     def __init__(self, lab: ScriptedLab, name: str) -> None:
         wiring = BOARDS[name]
-        image = f"build/{wiring.mcu}/firmware.elf"
-        make(image)
         self.can_sense = wiring.sense is not None
-        super().__init__(lab, EmulatedBoard(wiring, FIRMWARE / image, lab, seed=1, ppm=2000))
+        super().__init__(lab, EmulatedBoard(wiring, image_for(wiring), lab, seed=1, ppm=2000))
 
     def preset_tick(self, seconds_before_wrap):
         avr = self.now().avr
@@ -63,9 +67,7 @@ SCENE = str(FIRMWARE.parent / "protocols/inclined-uniform.yaml")
 
 def stand_of(name: str, **changes) -> Stand:
     wiring = BOARDS[name]
-    image = f"build/{wiring.mcu}/firmware.elf"
-    make(image)
-    return Stand(wiring, FIRMWARE / image, **changes)
+    return Stand(wiring, image_for(wiring), **changes)
 
 
 @pytest.fixture(scope="module", params=list(BOARDS))
@@ -106,8 +108,7 @@ def test_a_board_that_streams_keeps_up_with_4500_edges_a_second():
 
 
 def test_8000_edges_a_second_at_1_mbaud(mega):
-    make("build/1M/atmega2560/firmware.elf")
-    fast = Stand(BOARDS["mega"], FIRMWARE / "build/1M/atmega2560/firmware.elf", 1_000_000)
+    fast = Stand(BOARDS["mega"], make("build/1M/atmega2560/firmware.elf"), 1_000_000)
     assert trials.sustained(fast, 1000, 8000) == (1000, 0)
 
 
@@ -210,9 +211,7 @@ def test_a_main_loop_that_stands_still_ends_it_and_restarts_the_board(name):
 @pytest.mark.parametrize("name", BOARDS)
 def test_pins_that_nothing_drives_are_blocked_gates(name):
     wiring = BOARDS[name]
-    image = f"build/{wiring.mcu}/firmware.elf"
-    make(image)
-    avr = Avr(FIRMWARE / image, wiring.mcu)
+    avr = Avr(image_for(wiring), wiring.mcu)
     avr.edge(0, wiring.gates[3], False)
     avr.run(500_000)
     avr.take_sent()

@@ -26,7 +26,7 @@ from rig_emulator import trials
 from rig_emulator.stand import Flip, Recording, Stand
 from rig_emulator.wiring import BOARDS
 from tests.firmware.avr8js.avr import Avr8js, install
-from tests.firmware.toolchain import FIRMWARE, make, need
+from tests.firmware.toolchain import make, need
 
 pytestmark = pytest.mark.slow
 
@@ -44,9 +44,8 @@ LAGS = (0, 0, 16, 30, 120, 400)
 def image(tmp_path_factory) -> Path:
     install()
     need("avr-objcopy")
-    make("build/atmega328p/firmware.elf")
     path = tmp_path_factory.mktemp("avr8js") / "firmware.hex"
-    program = FIRMWARE / "build/atmega328p/firmware.elf"
+    program = make("build/atmega328p/firmware.elf")
     subprocess.run(["avr-objcopy", "-O", "ihex", "-R", ".eeprom", program, path], check=True)
     return path
 

@@ -13,16 +13,14 @@ from rig_emulator.fuzz import Fuzz
 from rig_emulator.wiring import BOARDS, PICO, firmware_for
 from tests.examples import examples
 from tests.firmware.pico import build
-from tests.firmware.toolchain import FIRMWARE, make
+from tests.firmware.toolchain import make
 
 
 @pytest.fixture(scope="module")
 def survivor():
     """A process that answers each input it survives: how often did the release go on?"""
-    make("build/host/fuzz")
-    with subprocess.Popen(
-        [FIRMWARE / "build/host/fuzz"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-    ) as process:
+    program = make("build/host/fuzz")
+    with subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
 
         def run(script: bytes) -> int:
             process.stdin.write(struct.pack("<I", len(script)) + script)

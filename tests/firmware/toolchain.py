@@ -19,7 +19,14 @@ def need(*tools: str) -> None:
     assert not missing, f"not installed: {', '.join(missing)}"
 
 
-def make(*targets: str) -> None:
-    """Bring targets of the firmware's Makefile up to date, one test process at a time."""
-    need("make", "gcc", *([] if all("host" in t for t in targets) else ["avr-gcc"]))
-    run_program("flock", FIRMWARE, "make", "-C", FIRMWARE, *targets, timeout=None)
+def make(target: str) -> Path:
+    """Bring a target of the firmware's Makefile up to date, one test process at a time.
+
+    Returns
+    -------
+    Path
+        Where the target is, if it is a file.
+    """
+    need("make", "gcc", *([] if "host" in target else ["avr-gcc"]))
+    run_program("flock", FIRMWARE, "make", "-C", FIRMWARE, target, timeout=None)
+    return FIRMWARE / target

@@ -11,6 +11,12 @@ from tests.link.talk import Wire, arm
 LONG = {"pulse_us": 100_000, "record_ms": 150}
 
 
+def later(watched, seconds: float) -> int:
+    """Let time pass, and return which releases are on."""
+    watched.clock().sleep(seconds)
+    return watched.outputs()
+
+
 class OutputSuite(Suite):
     def test_outputs_are_on_for_the_pulse_and_no_longer(self, watched, device, identity):
         seen = [watched.outputs()]
@@ -20,10 +26,8 @@ class OutputSuite(Suite):
         seen.append(watched.outputs())
         device.fire(token)
         seen.append(watched.outputs())
-        watched.clock().sleep(0.08)
-        seen.append(watched.outputs())
-        watched.clock().sleep(0.04)
-        seen.append(watched.outputs())
+        seen.append(later(watched, 0.08))
+        seen.append(later(watched, 0.04))
         drop = device.collect(LABEL)
         seen.append(watched.outputs())
         assert seen == [0, 0, 0, 1, 1, 0, 0]
@@ -35,8 +39,7 @@ class OutputSuite(Suite):
             pytest.skip("this board has one release")
         device.fire(arm(device, release=0b11, **LONG))
         assert watched.outputs() == 0b11
-        watched.clock().sleep(0.12)
-        assert watched.outputs() == 0
+        assert later(watched, 0.12) == 0
 
     def test_a_drop_without_release_switches_nothing(self, watched, device, identity):
         device.fire(arm(device, release=0, pulse_us=0))
@@ -47,10 +50,8 @@ class OutputSuite(Suite):
 
     def test_nothing_is_on_outside_of_a_recording(self, watched, device):
         device.fire(arm(device, pulse_us=80_000, record_ms=40))
-        watched.clock().sleep(0.03)
-        assert watched.outputs() == 1
-        watched.clock().sleep(0.02)
-        assert watched.outputs() == 0
+        assert later(watched, 0.03) == 1
+        assert later(watched, 0.02) == 0
 
     def test_abort_switches_off(self, watched, device):
         device.fire(arm(device, **LONG))
@@ -76,18 +77,15 @@ class OutputSuite(Suite):
 
     def test_a_reset_switches_off(self, watched, device):
         device.fire(arm(device, **LONG))
-        watched.clock().sleep(0.02)
-        assert watched.outputs() == 1
+        assert later(watched, 0.02) == 1
         watched.reset()
         assert watched.outputs() == 0
-        watched.clock().sleep(0.02)
-        assert watched.outputs() == 0
+        assert later(watched, 0.02) == 0
 
     def test_what_disarms_itself_never_was_on(self, watched, device):
         arm(device, timeout_ms=100)
         for _ in range(4):
-            watched.clock().sleep(0.05)
-            assert watched.outputs() == 0
+            assert later(watched, 0.05) == 0
         assert device.status().phase is wire.Phase.IDLE
 
 
@@ -155,15 +153,12 @@ class StopSuite(Suite):
         self, stoppable, watched, device, identity
     ):
         device.fire(arm(device, **LONG))
-        watched.clock().sleep(0.02)
-        assert watched.outputs() == 1
+        assert later(watched, 0.02) == 1
         stoppable.stop(True)
-        watched.clock().sleep(0.001)
-        assert watched.outputs() == 0
+        assert later(watched, 0.001) == 0
         assert device.status().phase is wire.Phase.RECORDING
         stoppable.stop(False)
-        watched.clock().sleep(0.001)
-        assert watched.outputs() == 0
+        assert later(watched, 0.001) == 0
         drop = device.collect(LABEL)
         (fault,) = drop.faults
         assert fault.code == "pulse_stopped"

@@ -49,15 +49,21 @@ def without_log(path):
 WAYS = [moved, deleted, replaced, without_log]
 
 
-@pytest.fixture
-def rig(tmp_path):
-    """Have a simulated rig that has recorded one of two drops."""
-    protocol, session = tmp_path / "fence.yaml", tmp_path / "session"
-    protocol.write_text(FENCE.replace("RUNS", "2"), "utf-8")
+def one_recorded(folder, runs):
+    """Have a simulated rig record one of several drops."""
+    protocol, session = folder / "fence.yaml", folder / "session"
+    protocol.write_text(FENCE.replace("RUNS", str(runs)), "utf-8")
     made = Controller("sim://", PublishedState())
     made.open_session(str(protocol), str(session), 3)
     made.fire(made.arm(1, 1))
     made.collect(1, 1)
+    return made, protocol, session
+
+
+@pytest.fixture
+def rig(tmp_path):
+    """Have a simulated rig that has recorded one of two drops."""
+    made, protocol, session = one_recorded(tmp_path, 2)
     made.log_state(1, 1, RunState.ACCEPTED)
     yield made, protocol, session
     with contextlib.suppress(SessionError):
@@ -182,12 +188,7 @@ def test_a_disk_that_can_only_be_read_any_more_leaves_the_drop_on_the_board(disk
     folder, trigger = disk
     if not os.access(trigger, os.W_OK):
         pytest.skip("no /sys/fs/ext4 here: a disk cannot be made to fail")
-    protocol, session = folder / "fence.yaml", folder / "session"
-    protocol.write_text(FENCE.replace("RUNS", "3"), "utf-8")
-    made = Controller("sim://", PublishedState())
-    made.open_session(str(protocol), str(session), 3)
-    made.fire(made.arm(1, 1))
-    made.collect(1, 1)
+    made, _, session = one_recorded(folder, 3)
     made.fire(made.arm(2, 1))
     trigger.write_text("1", "ascii")
     refused(SessionError, "the disk failed under", made.collect, 2, 1)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import bisect
+import itertools
 import json
 import re
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -78,24 +80,24 @@ def levels(edges: Truth, time: float) -> list[int]:
 
 
 STEP = 2e-4
+TIMES = 0.35 + STEP * np.arange(2000)
+"""Moments, s, of samples: from before the first edge of the first run until after its last."""
 
 
-def volts(edges: Truth, gates, end=0.8, bright=4.6, dark_v=0.2):
-    times = np.arange(0.0, end, STEP)
+def volts(edges: Truth, gates, bright=4.6, dark_v=0.2):
     columns = []
     for n in gates:
-        value = np.full(times.size, bright)
+        value = np.full(TIMES.size, bright)
         for t, channel, dark in edges:
             if channel == n:
-                share = np.clip((times - t) / 0.2e-3 + 0.5, 0, 1)
+                share = np.clip((TIMES - t) / 0.2e-3 + 0.5, 0, 1)
                 value += (dark_v - bright if dark else bright - dark_v) * share
-        columns.append(value + 0.03 * np.sin(300 * times + n))
-    return times, np.array(columns)
+        columns.append(value + 0.03 * np.sin(300 * TIMES + n))
+    return np.array(columns).T
 
 
 def scope(head: str, row, gates=tuple(HEIGHTS), runs=1, encoding="utf-8", **more) -> Shape:
-    times, columns = volts(RUNS[0], gates)
-    body = "".join(row(k, t, columns[:, k]) for k, t in enumerate(times))
+    body = "".join(map(row, itertools.count(), TIMES, volts(RUNS[0], gates)))
     truth = [[edge for edge in RUNS[0] if edge[1] in gates]]
     return Shape((head + body).encode(encoding), truth, sampled=STEP, **more)
 
@@ -141,6 +143,7 @@ def from_rows(group: str) -> dict[str, Shape]:
     }
 
 
+@cache
 def shapes() -> dict[str, Shape]:
     """Return every shape by its name."""
     found = from_rows("shapes")
@@ -186,7 +189,7 @@ def shapes() -> dict[str, Shape]:
         + "\n"
         for t, _, _ in [(0.0, 0, False), *RUNS[0]]))  # fmt: skip
     found["Siglent SDS"] = scope(
-        "Record Length,Analog:4000\nSample Interval,2.0E-04\n"
+        "Record Length,Analog:2000\nSample Interval,2.0E-04\n"
         "Vertical Units,CH1:V,CH2:V,CH3:V,CH4:V\n"
         "Vertical Scale,CH1:1.00,CH2:1.00,CH3:1.00,CH4:1.00\n"
         "Horizontal Units,S\nModel Number,SDS1104X-E\n"
@@ -195,11 +198,11 @@ def shapes() -> dict[str, Shape]:
     )
     found["Tektronix MDO"] = scope(
         "Model,MDO3024\nFirmware Version,1.26\n\nPoint Format,Y,\nHorizontal Units,S,\n"
-        "Sample Interval,2e-04,\nRecord Length,4000,\n,,\n\nTIME,CH1,CH2,CH3,CH4\n",
+        "Sample Interval,2e-04,\nRecord Length,2000,\n,,\n\nTIME,CH1,CH2,CH3,CH4\n",
         csv,
     )
     found["LeCroy"] = scope(
-        "LECROYHDO4104,1234,Waveform\nSegments,1,SegmentSize,4000\nSegment,TrigTime,TimeSinceSegment1\n"
+        "LECROYHDO4104,1234,Waveform\nSegments,1,SegmentSize,2000\nSegment,TrigTime,TimeSinceSegment1\n"
         "#1,22-Jan-2015 11:35:11,0\nTime,Ampl1,Ampl2,Ampl3,Ampl4\n",
         csv,
     )
@@ -225,10 +228,10 @@ def shapes() -> dict[str, Shape]:
     )
     found["Tektronix, digital, head marked"] = Shape((
         "#Model,MDO3014\n#Firmware Version,1.26\n#\n#Waveform Type,DIGITAL,,,\n#Point Format,Y,,,\n"
-        "#Horizontal Units,s,,,\n#Sample Interval,2e-04,,,\n#Record Length,4000,,,\n#,,,,\n"
+        "#Horizontal Units,s,,,\n#Sample Interval,2e-04,,,\n#Record Length,2000,,,\n#,,,,\n"
         "#Vertical Units,V,V,V,V\n#Label,,,,\nTIME,D0,D1,D2,D3\n"
-        + "".join(f"{n * STEP:.4e}," + ",".join(map(str, levels(RUNS[0], n * STEP))) + "\n"
-                  for n in range(4000))).encode(), RUNS[:1], sampled=STEP)  # fmt: skip
+        + "".join(f"{t:.4e}," + ",".join(map(str, levels(RUNS[0], t))) + "\n"
+                  for t in TIMES)).encode(), RUNS[:1], sampled=STEP)  # fmt: skip
     found["Hantek"] = scope("nr,time,ch1,ch2,ch3,ch4\n",
         lambda k, t, v: f"{k},{t:.6g}," + ",".join(f"{x:.2f}" for x in v) + "\n")  # fmt: skip
     found["PicoScope"] = scope(
@@ -236,14 +239,14 @@ def shapes() -> dict[str, Shape]:
         lambda k, t, v: ",".join([f"{t * 1e3:.8f}", *(f"{x:.8f}" for x in v)]) + "\n",
     )
     found["Digilent"] = scope(
-        "#Digilent WaveForms Oscilloscope Acquisition\n#Sample rate: 5000Hz\n#Samples: 4000\n\n"
+        "#Digilent WaveForms Oscilloscope Acquisition\n#Sample rate: 5000Hz\n#Samples: 2000\n\n"
         "Time (s),Channel 1 (V),Channel 2 (V),Channel 3 (V),Channel 4 (V)\n",
         csv,
     )
     lvm = (
         "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\n"
         "Decimal_Separator\t{}\nMulti_Headings\tNo\nX_Columns\t{}\nTime_Pref\tRelative\n"
-        "***End_of_Header***\t\n\t\nChannels\t4\t\t\t\t\nSamples\t4000\t4000\t4000\t4000\t\n"
+        "***End_of_Header***\t\n\t\nChannels\t4\t\t\t\t\nSamples\t2000\t2000\t2000\t2000\t\n"
         "Y_Unit_Label\tVolts\tVolts\tVolts\tVolts\t\nX_Dimension\tTime\tTime\tTime\tTime\t\n"
         "X0\t0.0\t0.0\t0.0\t0.0\t\nDelta_X\t2.0E-4\t2.0E-4\t2.0E-4\t2.0E-4\t\n"
         "***End_of_Header***\t\t\t\t\t\nX_Value\tGate 0\tGate 1\tGate 2\tGate 3\tComment\n"
@@ -264,11 +267,10 @@ def shapes() -> dict[str, Shape]:
     )
     found["Saleae"] = text("Time [s],Channel 0,Channel 1,Channel 2,Channel 3\n0.000000000,0,0,0,0\n"
         + table([f"{t:.9f}", *levels(RUNS[0], t)] for t, _, _ in RUNS[0]))  # fmt: skip
-    times = [n * STEP for n in range(4000)]
     found["sigrok"] = Shape((
         "; CSV generated by libsigrok\n; Channels (4/8): D0, D1, D2, D3\n; Samplerate: 5 kHz\n"
         + "logic,logic,logic,logic\n"
-        + "".join(",".join(map(str, levels(RUNS[0], t))) + "\n" for t in times)
+        + "".join(",".join(map(str, levels(RUNS[0], t))) + "\n" for t in TIMES)
         + "FRAME-END\n").encode(),
         RUNS[:1], sampled=STEP, bare=True)  # fmt: skip
     found["sigrok, inputs with names"] = Shape(
@@ -301,7 +303,7 @@ def shapes() -> dict[str, Shape]:
         "Model,MDO3024\nPoint Format,Y,\nSample Interval,2e-04,\nLabel,gate\nTIME,CH1\n",
         lambda k, t, v: f"{t - 0.1:.7e},{v[0]:.3f}\n", gates=[0], options=one)  # fmt: skip
     found["Hantek, volts alone"] = scope(
-        "#CHANNEL:CH1\n#CLOCK=0.000200000S\n#SIZE=4000\n#UNITS:V\n\n",
+        "#CHANNEL:CH1\n#CLOCK=0.000200000S\n#SIZE=2000\n#UNITS:V\n\n",
         lambda k, t, v: f"{v[0]:.6f}\n", gates=[0], options=one, bare=True)  # fmt: skip
     found["sigrok, no heading"] = Shape(
         found["sigrok"].content.replace(b"logic,logic,logic,logic\n", b""),

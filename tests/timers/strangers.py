@@ -6,6 +6,7 @@ from tests.timers.shapes import (
     HEIGHTS,
     RUNS,
     STEP,
+    TIMES,
     Shape,
     by_gate,
     csv,
@@ -141,7 +142,7 @@ def strangers() -> dict[str, Shape]:
     put("Counts below decimals", "Run 1\ngate,time,state\n" + write("{c},{ms},{d}\n")
         + "Run 2\nstate,gate,time\n" + write("{d},{c},{coarse}\n", runs=RUNS[1:2]),
         RUNS[:2], sampled=5e-4)  # fmt: skip
-    bits = "".join(f"{n},{','.join(map(str, levels(one, n * STEP)))}\n" for n in range(4000))
+    bits = "".join(f"{n},{','.join(map(str, levels(one, t)))}\n" for n, t in enumerate(TIMES))
     put("Samples with an index", "n,D0,D1,D2,D3\n" + bits, sampled=STEP)
     put("Samples at a stated rate", "# Fs = 5 kHz\nn,D0,D1,D2,D3\n" + bits, sampled=STEP)
     put("Samples of a channel for all gates", "time (s),state\n" + "".join(
@@ -198,7 +199,7 @@ def strangers() -> dict[str, Shape]:
         + table([c + 1, f"{a[0]:.6f}", f"{b[0]:.6f}"] for c, (a, b) in by_gate(one).items()),
     )
     files["Rows of a period"] = scope(
-        "Memory Length,4000,\nSampling Period,2e-04,\nCH1,CH2,CH3,CH4,\n",
+        "Memory Length,2000,\nSampling Period,2e-04,\nCH1,CH2,CH3,CH4,\n",
         lambda k, t, v: ",".join(f"{x:.4f}" for x in v) + ",\n", bare=True)  # fmt: skip
     return files
 

@@ -1,6 +1,5 @@
 """A daemon with a simulated rig, an operator's hands on the screen, and the screen as text."""
 
-import asyncio
 import io
 import os
 import re
@@ -211,10 +210,6 @@ def draw_without_pause(monkeypatch: pytest.MonkeyPatch) -> None:
 def short_folder() -> Path:
     """Make a folder with a name that a socket's address has room for."""
     return Path(tempfile.mkdtemp(prefix="rig-"))
-
-
-def run(work: Any) -> Any:
-    return asyncio.run(work)
 
 
 def text_of(app: App[object]) -> str:

@@ -11,7 +11,7 @@ import pytest
 from rig.campaign.machine import Stage
 from rig.session.store import Session
 from rig.tui import app, client
-from tests.tui.lab import PATIENCE_S, run, text_of
+from tests.tui.lab import PATIENCE_S, text_of
 
 
 def test_all_that_waits_before_a_hanging_daemon_is_said_is_less_than_a_second():
@@ -135,6 +135,6 @@ def test_a_drop_that_falls_without_its_line_is_found_when_it_is_back(cabled, fau
             await op.sees("Run 1 of 2", again, "ACCEPTED")
         return job
 
-    job = run(work())
+    job = asyncio.run(work())
     with Session.open(lab.session, readonly=True) as session:
         assert [(drop.run, drop.attempt) for drop in session.drops()] == [job]

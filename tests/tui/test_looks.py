@@ -4,6 +4,7 @@
 ``looks.session.xz`` is what ``rig run`` recorded of `tests.cli.lab.short` at ``sim://?seed=4``.
 """
 
+import asyncio
 import lzma
 import os
 import re
@@ -23,7 +24,7 @@ from rig.tui.app import THEMES, RigApp
 from rig.tui.context import Options
 from rig.tui.state import state_of
 from tests.cli.lab import short
-from tests.tui.lab import KEYS, colours_of, draw_without_pause, run, text_of
+from tests.tui.lab import KEYS, colours_of, draw_without_pause, text_of
 
 THEME_NAMES = [theme.name for theme in THEMES]
 GOLDENS = Path(__file__).parent / "goldens"
@@ -60,7 +61,7 @@ def test_a_screen_looks_as_it_did(moment, looks):
     texts = [
         text
         for sizes in screens
-        for text in run(_screens(moment, sizes, looks, lambda app: [text_of(app)]))
+        for text in asyncio.run(_screens(moment, sizes, looks, lambda app: [text_of(app)]))
     ]
     for (columns, lines), text in zip(SIZES, texts, strict=True):
         golden = GOLDENS / f"{moment}-{columns}x{lines}.txt"
@@ -83,7 +84,7 @@ def luminance(colour) -> float:
 
 @pytest.mark.parametrize("moment", ["device", "run", "trouble", "session"])
 def test_all_text_can_be_read_in_every_theme(moment, looks):
-    found = run(_screens(moment, SIZES[1:2], looks, colours_of, THEME_NAMES))
+    found = asyncio.run(_screens(moment, SIZES[1:2], looks, colours_of, THEME_NAMES))
     assert len(found) > 20 * len(THEME_NAMES)
     for text, ink, paper in found:
         if not any(map(str.isalnum, text)):

@@ -44,42 +44,37 @@ async def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
         await op.arms(Stage.RESULT)
         await op.until(lambda: op.app.flow.logged and rung)
         await op.press("n", *"[/b] hn", "enter")
-        await op.sees("note: [/b] hn")
-        await op.until(lambda: op.app.flow.logged)
+        await kept(op, "note: [/b] hn")
         await op.press("n", "backspace", "m", "enter")  # what is there is changed
-        await op.sees("note: [/b] hm")
+        await kept(op, "note: [/b] hm")
         assert rung == [Stage.RESULT]
-        await op.until(lambda: op.app.flow.logged)
         await op.press("x", "escape")
         assert op.app.flow.verdict == "accepted"
         await op.press("x")
         await op.until(lambda: isinstance(op.app.screen, Ask))
         await op.until(pressed_and_seen(op, "enter", "type or choose a reason first"))
         await op.press(*"draught", "enter")
-        await op.sees("REJECTED", "draught", "note: [/b] hm")
-        await op.until(lambda: op.app.flow.logged)
+        await kept(op, "REJECTED", "draught", "note: [/b] hm")
         await op.press("x")
         await op.means()
         await op.until(lambda: op.app.flow.verdict == "accepted" and op.app.flow.logged)
         await op.press("x", "down", "enter")
-        await op.sees("REJECTED", REASONS[0])
-        await op.until(lambda: op.app.flow.logged)
+        await kept(op, "REJECTED", REASONS[0])
         await op.press("a")
         await op.means()
         await op.arms(Stage.RESULT)
-        await op.until(lambda: op.app.flow.logged)
+        await kept(op)
         await op.press("x")
         await op.press("escape")
         await op.press("a")
         await op.sees("the new attempt will count instead")
         await op.means()
         await op.arms(Stage.RESULT)
-        await op.until(lambda: op.app.flow.logged)
+        await kept(op)
         await op.press("x")
         await op.sees("attempt 2 was good")
         await op.press("down", "down", "enter")
-        await op.sees("attempt 2 was good, but run 1 has no result now")
-        await op.until(lambda: op.app.flow.logged)
+        await kept(op, "attempt 2 was good, but run 1 has no result now")
         await op.press("enter")
         await op.at(Stage.PREPARE)
         await op.sees("Run 2 of 3")
@@ -101,6 +96,12 @@ async def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
         (RunState.ACCEPTED, (note,)),
         (RunState.REJECTED, (REASONS[0], note)),
     ]
+
+
+async def kept(op, *texts):
+    """See that texts stand on the screen, and wait until the session has what they say."""
+    await op.sees(*texts)
+    await op.until(lambda: op.app.flow.logged)
 
 
 def pressed_and_seen(op, key, text):
@@ -125,7 +126,7 @@ async def test_a_blind_session_shows_its_numbers_when_it_is_unblinded(lab):
             await op.until(lambda page=page: op.app.action_of[page] == f"page_{op.app.page}")
             assert "± 0" not in text_of(op.app)
             assert not op.app.follower.view.drops[op.app.follower.view.jobs[0]].edges
-        await op.until(lambda: op.app.flow.logged)
+        await kept(op)
         await op.press("4", "b")
         await op.means()
         await op.sees("ACCEPTED", "m/s²", "± 0")

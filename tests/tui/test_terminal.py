@@ -20,7 +20,7 @@ from rig.errors import RigError
 from rig.tui import terminal as keyboard
 from rig.tui.stillness import STILL_S
 from tests.cli.lab import ROOT, assert_whole, short
-from tests.tui.lab import run, short_folder
+from tests.tui.lab import short_folder
 from tests.waiting import PATIENCE_S, until
 
 _NEEDS_TMUX = pytest.mark.skipif(
@@ -152,7 +152,7 @@ def test_keys_have_one_reader_after_the_program_was_stopped(monkeypatch):
 
     handlers = {number: signal.getsignal(number) for number in (signal.SIGTSTP, signal.SIGCONT)}
     try:
-        run(work())
+        asyncio.run(work())
     finally:
         for number, handler in handlers.items():
             signal.signal(number, handler)

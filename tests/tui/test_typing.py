@@ -20,7 +20,7 @@ from rig.tui.context import Options
 from rig.tui.state import state_of
 from tests.cli.lab import short
 from tests.examples import examples
-from tests.tui.lab import KEYS, run
+from tests.tui.lab import KEYS
 from tests.waiting import PATIENCE_S
 
 STILL_S = 0.15
@@ -154,12 +154,12 @@ def session(tmp_path_factory):
 @example([("prepare", "l", TYPED_ON)])
 @example([("result", "", [("type", "board moved"), ("hold", "enter"), ("wait", 0.6)])])
 def test_nothing_is_armed_but_by_the_deliberate_step(session, lived):
-    told, keys = run(_typed(session, lived))
+    told, keys = asyncio.run(_typed(session, lived))
     end = time.monotonic() + PATIENCE_S
     while lived in [ARMS, ENDS, PASTES] and not told:
         # On a busy machine a page may not have stood still long enough.
         assert time.monotonic() < end
-        told, keys = run(_typed(session, lived))
+        told, keys = asyncio.run(_typed(session, lived))
     for at, method in told:
         meant = [(when, face) for when, face in keys if face and when <= at]
         if method == "wait":  # the first of what arms
