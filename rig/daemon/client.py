@@ -8,10 +8,10 @@ from __future__ import annotations
 import asyncio
 import itertools
 import json
+import math
 import socket
 import struct
 import threading
-import time
 from collections.abc import Callable
 from concurrent.futures import Future, wait
 from contextlib import ExitStack, nullcontext, suppress
@@ -357,11 +357,10 @@ def _message_of(line: bytes) -> dict[str, Any]:
 
 
 def _result(answer: Future[Any], patience_s: float, silent: RigError) -> Any:
-    end = time.monotonic() + patience_s
-    while wait([answer], min(patience_s, _HEED_S)).not_done:
-        if time.monotonic() >= end:
-            raise silent
-    return answer.result()
+    for _ in range(math.ceil(patience_s / _HEED_S)):
+        if wait([answer], _HEED_S).done:
+            return answer.result()
+    raise silent
 
 
 def _gone(why: object) -> RigError:

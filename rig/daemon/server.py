@@ -189,7 +189,7 @@ class Server:
             self._see_lease()
             self._see_worker()
             self._see_rest()
-            if not door.there() and not self.published.get("clients"):
+            if not (door.there() or self.published.get("clients")):
                 raise rig_error("socket_lost", path=door.path, folder=state_folder())
 
     def _see_lease(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import astuple
 from typing import Any, NamedTuple
 
 from rig.protocol.protocol import Run
@@ -18,10 +19,10 @@ class RunLine(NamedTuple):
     incline_deg: float
     impact: str | None
     free: str | None
+    setting: str = ""
     attempt: int = 0
     state: str = "planned"
     reasons: tuple[Reason, ...] = ()
-    setting: str = ""
 
     @property
     def again(self) -> Job:
@@ -42,9 +43,4 @@ def read_line(line: Mapping[str, Any]) -> RunLine:
 def plan_lines(planned: Iterable[Run], log: Iterable[StateEntry]) -> list[RunLine]:
     """Say where each planned run stands by the log of a session."""
     last = {entry.run: (entry.attempt, entry.state, entry.reasons) for entry in log}
-    return [
-        RunLine(
-            run.number, run.incline_deg, run.impact, run.free, *last.get(run.number, ())
-        )._replace(setting=run.setting)
-        for run in planned
-    ]
+    return [RunLine(*astuple(run), *last.get(run.number, ())) for run in planned]

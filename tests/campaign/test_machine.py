@@ -254,7 +254,7 @@ def test_a_drop_that_fell_has_no_refusals_left():
 
 
 def lines(*states):
-    return [RunLine(n, 0.0, "A", "B", 1, state) for n, state in enumerate(states, start=1)]
+    return [RunLine(n, 0.0, "A", "B", "", 1, state) for n, state in enumerate(states, start=1)]
 
 
 def test_runs_come_in_order_until_each_is_settled_or_void_too_often():
@@ -352,4 +352,4 @@ def test_what_was_heard_of_since_the_log_was_read_counts_once(run_line):
 
 @pytest.fixture
 def run_line():
-    return lambda run, attempt: RunLine(run, 0.0, "A", "B", attempt, "void")
+    return lambda run, attempt: RunLine(run, 0.0, "A", "B", "", attempt, "void")
