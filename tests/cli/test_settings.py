@@ -4,80 +4,109 @@ import json
 
 import pytest
 
-from rig.cli import main
+from rig.analysis.owners import suffixes
+from rig.protocol.plan import runs
+from rig.protocol.reader import parse, read
 from tests.cli.lab import PROTOCOLS, record, short, truth_of, without
 
-HEIGHTS = (0.9, 1.2, 1.6)
+HEIGHTS = [f"drop {height} mm ± 1 mm" for height in (900, 1200, 1600)]
+CHAINS = ["drop 180 mm", "drop 228.5 mm"]
 
 
-def ball(heights):
-    text = (PROTOCOLS / "falling-ball.yaml").read_text("utf-8")
-    values = ", ".join(f"{height * 1e3:g} mm ± 1 mm" for height in heights)
-    plan = f"{{vary: {{drop: [{values}]}}, repeats: 4}}"
-    return without("drop", text).replace("{repeats: 10, settle: 5 s}", plan)
+def vary(words: str, text: str, *keys: str) -> str:
+    """Let the plan of a protocol vary keys, which are then stated nowhere else."""
+    for key in keys:
+        text = "\n".join(line for line in text.splitlines() if not line.lstrip().startswith(key))
+    return text.replace("plan: {", f"plan: {{vary: {words}, ") + "\n"
 
 
-def analysed(call, session):
-    return json.loads(call("analyze", str(session), "--json").out)
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_gravity_is_one_mean_of_all_heights_and_gates_are_of_each(seed, tmp_path, call):
-    result = analysed(call, record(tmp_path, ball(HEIGHTS), f"sim://?stated=1&seed={seed}"))
-    (line,) = result["summary"]
-    assert line["n"] == 12
-    assert abs(line["gravity_m_s2"]["value"] - 9.81) < line["gravity_m_s2"]["U95"]
-    settings = {f"drop {height * 1e3:g} mm ± 1 mm" for height in HEIGHTS}
-    assert {gate["setting"] for gate in line["gates"]} == settings
-    assert {run["setting"] for run in result["runs"]} == settings
-    heights = [row for row in result["learned"]["unknowns"] if row["name"].startswith("drop")]
-    assert len(heights) == len(HEIGHTS), "each height has an error of its own"
+@pytest.fixture(scope="module")
+def balls(tmp_path_factory):
+    """Two sessions of the same plan, of the same rig and of another."""
+    folder, text = tmp_path_factory.mktemp("balls"), (PROTOCOLS / "falling-ball.yaml").read_text()
+    values = ", ".join(setting.removeprefix("drop ") for setting in HEIGHTS)
+    text = vary(f"{{drop: [{values}]}}", without("drop", text)).replace("repeats: 10", "repeats: 4")
+    return [record(folder, text, f"sim://?stated=1&seed={n}", f"b{n}") for n in range(2)]
 
 
 @pytest.fixture(scope="module")
 def chains(tmp_path_factory):
     """Two chains at 40°, from two heights a rod's distance apart."""
-    text = without("drop", short("40 deg", 4))
-    text = text.replace("plan: {", "plan: {vary: {drop: [180 mm, 228.5 mm]}, ")
+    text = vary("{drop: [180 mm, 228.5 mm]}", without("drop", short("40 deg", 4)))
     return record(tmp_path_factory.mktemp("chains"), text, "sim://?stated=1&seed=3")
+
+
+def analysed(call, *sessions):
+    return json.loads(call("analyze", *map(str, sessions), "--json").out)
+
+
+def test_gravity_is_one_mean_of_all_heights_and_gates_are_of_each(balls, call):
+    for session in balls:
+        result = analysed(call, session)
+        (line,) = result["summary"]
+        assert line["n"] == 12
+        assert abs(line["gravity_m_s2"]["value"] - 9.81) < line["gravity_m_s2"]["U95"]
+        assert [gate["setting"] for gate in line["gates"]] == HEIGHTS * 4
+        assert {run["setting"] for run in result["runs"]} == {*HEIGHTS}
+        heights = [row for row in result["learned"]["unknowns"] if row["name"].startswith("drop")]
+        assert len(heights) == len(HEIGHTS), "each height has an error of its own"
+    assert [line["n"] for line in analysed(call, *balls)["summary"]] == [24]
+
+
+def test_another_timers_file_is_read_by_each_runs_own_scene(balls, call, tmp_path):
+    call("export", str(balls[0]), "--csv", str(tmp_path))
+    edges = (tmp_path / "edges.csv").read_text("utf-8").splitlines()
+    file, again = tmp_path / "timer.csv", tmp_path / "again.session"
+    file.write_text("\n".join(["run,gate,time (s),blocked", *edges[1:]]), "utf-8")
+    words = ("--protocol", balls[0].with_suffix(".yaml"), "--session", again, "--simulated")
+    call("import", file, *words, "--clock-uncertainty", "5 ppm")
+    assert len(analysed(call, again)["runs"]) == 12
 
 
 def test_each_setting_is_compared_with_its_own_prediction(chains, call):
     result = analysed(call, chains)
     lines = result["summary"]
-    assert [(line["setting"], line["n"]) for line in lines] == [
-        ("drop 180 mm", 4), ("drop 228.5 mm", 4),
-    ]  # fmt: skip
+    assert [(line["setting"], line["n"]) for line in lines] == [(at, 4) for at in CHAINS]
     low, high = (line["predicted"]["speed_m_s"] for line in lines)
     assert high > low + 0.1
     for line in lines:
-        for name in ("separation_m", "speed_m_s"):
-            assert abs(line["normalized_error" + "_speed" * (name == "speed_m_s")]) < 1.0
-    true = {truth["run"]: truth for truth in truth_of(chains)}
-    held = [
-        abs(run["separation_m"]["value"] - true[run["run"]]["separation_m"])
-        < run["separation_m"]["U95"]
-        for run in result["runs"]
-    ]
-    assert sum(held) >= 7
+        assert abs(line["normalized_error"]) < 1.0
+        assert abs(line["normalized_error_speed"]) < 1.0
+    true = {truth["run"]: truth["separation_m"] for truth in truth_of(chains)}
+    values = [(run["separation_m"], true[run["run"]]) for run in result["runs"]]
+    assert sum(abs(found["value"] - truth) < found["U95"] for found, truth in values) >= 7
 
 
 def test_pages_tables_and_coefficients_tell_the_settings_apart(chains, call, tmp_path):
-    assert "drop 228.5 mm" in call("predict", str(chains.with_name("s.yaml"))).out
+    assert CHAINS[1] in call("predict", str(chains.with_name("s.yaml"))).out
     page = tmp_path / "page.html"
     call("report", str(chains), "-o", str(page))
-    assert page.read_text("utf-8").count("drop 228.5 mm") > 4
-    call("export", str(chains), "--csv", str(tmp_path / "csv"))
-    assert "drop 180 mm" in (tmp_path / "csv" / "runs.csv").read_text("utf-8")
+    assert page.read_text("utf-8").count(CHAINS[1]) > 4
     found = json.loads(call("estimate", str(chains), "--json").out)
-    settings = [line["setting"] for line in found["alpha"]["inclines"]]
-    assert settings == ["drop 180 mm", "drop 228.5 mm"]
+    assert [line["setting"] for line in found["alpha"]["inclines"]] == CHAINS
     call("replay", str(chains))
 
 
 def test_coefficients_are_those_of_one_surface(tmp_path, call):
-    text = short("40 deg", 2).replace("  friction: 0.20 ± 0.02\n", "")
-    text = text.replace("plan: {", "plan: {vary: {surface.friction: [0.1, 0.3]}, ")
+    text = vary("{surface.friction: [0.1, 0.3]}", short("40 deg", 2), "friction")
     session = record(tmp_path, text)
-    assert main(["analyze", str(session)]) == 0
-    assert "varies surface.friction 0.1" in call("estimate", str(session), code=2).err
+    for words in (["estimate", session], ["design", session.with_suffix(".yaml")]):
+        assert "varies surface.friction 0.1" in call(*map(str, words), code=2).err
+
+
+def test_unknowns_are_shared_by_settings_that_state_the_same():
+    words = "{drop: [180 mm, 228.5 mm], surface.friction: [0.1, 0.2]}"
+    protocol = parse(vary(words, short("40 deg", 1), "drop", "friction"))
+    first = [{}, {}, *[{"start": " (drop 228.5 mm, surface.friction 0.1)"}] * 2]
+    assert [suffixes(protocol, run) for run in runs(protocol)] == first
+    ball = (PROTOCOLS / "falling-ball.yaml").read_text("utf-8")
+    text = vary("{drag.terminal_speed: [60 m/s, 50 m/s]}", f"{without('drag', ball)}drag: {{}}")
+    protocol = parse(text)
+    assert {owner for run in runs(protocol) for owner in suffixes(protocol, run)} == {"air"}
+    assert suffixes(read(PROTOCOLS / "falling-ball.yaml"), runs(protocol)[0]) == {}
+
+
+def test_chains_that_any_setting_makes_unlike_are_told_apart():
+    text = short().replace("length: 1165 mm, ", "").replace("like: A", "like: A, length: 1165 mm")
+    protocol = parse(vary("{chains.A.length: [1165 mm, 1150 mm]}", text))
+    assert {protocol.condition(run).impact_chain for run in runs(protocol)} == {"A", "B"}
