@@ -90,7 +90,7 @@ class ListOf(NamedTuple):
 class Plain(StrEnum):
     """A mapping, with keys of the table or names chosen by the file; or any text."""
 
-    MAPPED = "a mapping {key: value, …}"
+    MAPPED = "a mapping {…: …}"
     TEXT = "text"
 
 
