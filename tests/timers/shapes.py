@@ -79,6 +79,9 @@ def levels(edges: Truth, time: float) -> list[int]:
     ]  # fmt: skip
 
 
+LEVELS = table([f"{t:.6f}", *levels(RUNS[0], t)] for t, _, _ in RUNS[0])
+"""Time and the state of each gate, at each edge of the first run."""
+
 STEP = 2e-4
 TIMES = 0.35 + STEP * np.arange(2000)
 """Moments, s, of samples: from before the first edge of the first run until after its last."""
@@ -183,8 +186,7 @@ def shapes() -> dict[str, Shape]:
                 for three in zip(*RUNS, strict=True)), 3)  # fmt: skip
     found["SPARKvue"] = text(
         '"Time (s)","Gate 0 State (Blocked/Unblocked)",'
-        '"Gate 1 State","Gate 2 State","Gate 3 State"\n'
-        + table([f"{t:.6f}", *levels(RUNS[0], t)] for t, _, _ in RUNS[0])
+        '"Gate 1 State","Gate 2 State","Gate 3 State"\n' + LEVELS
     )
     found["Vernier Format 2"] = text("".join(
         f"Vernier Format 2\nfall.cmbl\nRun {n}\nTime\tGate 0\tGate 1\tGate 2\tGate 3\n"
@@ -283,9 +285,7 @@ def shapes() -> dict[str, Shape]:
     found["VCD"] = text(vcd(RUNS[0]))
     zeros = "#0\n" + "".join(f"0{mark}\n" for mark in "!#$%")
     found["VCD from its first change"] = text(vcd(RUNS[0]).replace(zeros, ""))
-    found["Levels without a heading"] = text(
-        table([f"{t:.6f}", *levels(RUNS[0], t)] for t in (0, *(t for t, _, _ in RUNS[0])))
-    )
+    found["Levels without a heading"] = text("0.000000,0,0,0,0\n" + LEVELS)
     found["Time at each gate"] = Shape(
         (
             ",".join(f"Time at gate {g} (s)" for g in HEIGHTS)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tests.timers.shapes import (
     HEIGHTS,
+    LEVELS,
     RUNS,
     STEP,
     TIMES,
@@ -110,8 +111,7 @@ def strangers() -> dict[str, Shape]:
     )
     put(
         "A state without a name",
-        "Time (s),State 0,State 1,,State 3\n0.000000,0,0,0,0\n"
-        + table([f"{t:.6f}", *levels(one, t)] for t, _, _ in one),
+        "Time (s),State 0,State 1,,State 3\n0.000000,0,0,0,0\n" + LEVELS,
     )
     time, channel, dark = one[3]
     bounce = [(time + 2e-6, channel, not dark), (time + 4e-6, channel, dark)]
