@@ -24,26 +24,40 @@ TOP = UNIFORM.chains["A"].chain.rods - 1
 DEPARTURE = 0.4e-3
 
 
+def moved(one: Case, later) -> Case:
+    """The same drop, of which each whole passage comes later; how much, s, may depend on it.
+
+    `later` is given gate, rod, when its edges are, and how long that lasts.
+    """
+    passages = defaultdict(list)
+    for n, (time, channel, _, rod) in enumerate(one.truth.edges):
+        if rod >= 0:
+            passages[channel, rod].append((time, n))
+    edges = list(one.drop.edges)
+    for (channel, rod), seen in passages.items():
+        if len(seen) == 2:
+            (begin, _), (end, _) = seen
+            ticks = round(HZ * later(GATES[channel], rod, begin, abs(end - begin)))
+            for _, n in seen:
+                edges[n] = edges[n]._replace(tick=edges[n].tick + ticks)
+    return one.with_edges(edges)
+
+
 def shaken(one: Case, seed: int) -> Case:
     """Every rod off its chain at every beam by as much as lively strings make it, once one struck.
 
     When that is and how fast rods pass is taken from the edges themselves.
     """
     rng = np.random.default_rng(seed)
-    passages = defaultdict(list)
-    for n, (time, channel, _, rod) in enumerate(one.truth.edges):
-        if rod >= 0 and GATES[channel].side == "impact":
-            passages[channel, rod].append((time, n))
-    struck = max(time for time, _ in passages[LOWEST[0].channel, 0])
-    edges = list(one.drop.edges)
-    width = UNIFORM.chains["A"].widths[0]
-    for (_, rod), seen in passages.items():
-        if len(seen) != 2 or seen[0][0] < struck or rod == TOP:
-            continue
-        off = DEPARTURE * rng.normal() * abs(seen[1][0] - seen[0][0]) / width
-        for _, n in seen:
-            edges[n] = edges[n]._replace(tick=edges[n].tick + round(off * HZ))
-    return one.with_edges(edges)
+    lowest, width = LOWEST[0].channel, UNIFORM.chains["A"].widths[0]
+    struck = max(time for time, at, _, rod in one.truth.edges if (at, rod) == (lowest, 0))
+
+    def later(gate, rod, begin, lasting):
+        if gate.side != "impact" or begin < struck or rod == TOP:
+            return 0.0
+        return DEPARTURE * rng.normal() * lasting / width
+
+    return moved(one, later)
 
 
 def swinging(one: Case, rate: float) -> Case:
@@ -52,21 +66,13 @@ def swinging(one: Case, rate: float) -> Case:
     How fast each passes is taken from the edges themselves.
     """
     chain, drop, gravity = UNIFORM.chains["A"], UNIFORM.drop.value, UNIFORM.gravity.value
-    passages = defaultdict(list)
-    for n, (time, channel, _, rod) in enumerate(one.truth.edges):
-        if rod >= 0:
-            passages[channel, rod].append((time, n))
     places = np.array(chain.chain.heights)
-    edges = list(one.drop.edges)
-    for (channel, rod), seen in passages.items():
-        if len(seen) != 2:
-            continue
-        lower = 0.5 * rate**2 * 2.0 * (drop + places[rod] - GATES[channel].height) / gravity
-        lower *= places[rod] - places.mean()
-        earlier = lower * abs(seen[1][0] - seen[0][0]) / chain.widths[0]
-        for _, n in seen:
-            edges[n] = edges[n]._replace(tick=edges[n].tick - round(earlier * HZ))
-    return one.with_edges(edges)
+
+    def later(gate, rod, _begin, lasting):
+        lower = 0.5 * rate**2 * 2.0 * (drop + places[rod] - gate.height) / gravity
+        return -lower * (places[rod] - places.mean()) * lasting / chain.widths[0]
+
+    return moved(one, later)
 
 
 EIGHT = (1, 2, 3, 4, 5, 6, 7, 8)

@@ -19,6 +19,7 @@ from rig.units import Quantity
 from sim.dials import Dials, read_dials
 from tests.analysis.drops import GRADED, UNIFORM, Case, case, codes, with_dials
 from tests.analysis.sessions import MILD
+from tests.tables import cases
 
 
 def exchanged(one: Case, a: int, b: int) -> Case:
@@ -52,23 +53,26 @@ def test_a_chain_that_hangs_a_rod_s_distance_higher_has_no_rod_too_many():
     assert abs(named.values["size_m"] - pitch) < named.values["U95_m"]
 
 
+def shorter(rods, length, without):
+    """The uniform chain of fewer rods, where some channels have no gate."""
+    text = UNIFORM.text.replace("rods: 25", f"rods: {rods}").replace("1165 mm", length)
+    others = [f"channel: {channel}," for channel in without]
+    return parse("\n".join(line for line in text.splitlines() if not any(map(line.count, others))))
+
+
 def test_gates_exchanged_that_leave_edges_unexplained_are_said():
     """Few rods, of which nearly as many edges fit the wrong gates."""
-    text = UNIFORM.text.replace("rods: 25", "rods: 6").replace("1165 mm", "242.5 mm")
-    others = [f"channel: {channel}," for channel in (1, 4, 5, 6, 7, 9, 10, 12, 13, 14, 15)]
-    lines = [line for line in text.splitlines() if not any(map(line.count, others))]
+    few = shorter(6, "242.5 mm", without=(1, 4, 5, 6, 7, 9, 10, 12, 13, 14, 15))
     dials = Dials(skew_sd=1e-3, chatter=0.0, bounce=0.3)
-    one = case(parse("\n".join(lines)), dials, incline=10.0, seed=249)
+    one = case(few, dials, incline=10.0, seed=249)
     assert codes(exchanged(one, 0, 2).analyze())[-1] == "gates_exchanged"
 
 
 def test_too_few_edges_for_any_fall_are_no_sign_of_fewer_rods():
     """A short chain, of whose three gates one is silent, and the others missed some edges."""
-    text = UNIFORM.text.replace("rods: 25", "rods: 4").replace("1165 mm", "145.5 mm")
-    higher = [f"channel: {channel}," for channel in (4, 5, 6, 7, 11, 12, 13, 14, 15)]
-    lines = [line for line in text.splitlines() if not any(map(line.count, higher))]
+    few = shorter(4, "145.5 mm", without=(4, 5, 6, 7, 11, 12, 13, 14, 15))
     dials = Dials(skew_sd=1e-3, missed=0.1)
-    one = case(parse("\n".join(lines)), dials, incline=40.0, seed=5)
+    one = case(few, dials, incline=40.0, seed=5)
     result = one.with_edges([edge for edge in one.drop.edges if edge.channel != 8]).analyze()
     assert codes(result) == ["few_edges_fit", "gate_silent"]
 
@@ -87,33 +91,17 @@ UNLIKE = under(
     (0.2, 0.3, 0.45, 0.7),
     (0.18, 0.35, 0.55, 0.75),
 )
-# Large enough that one drop tells it, from the catalogue of the bench.
-TOLD = (
-    ("chain stretched", FEW, 3.0, 13.5),
-    ("rod missing", MORE, 0.0, 0.0),
-    ("rods thicker", FEW, 25.0, 3.25),
-    ("drop height", UNLIKE, -15.0, 15.0),
-    ("contact level", UNLIKE, 15.0, 15.0),
-    ("post's datum", UNLIKE, 5.0, 5.0),
-    ("gate off", FEW, 20.0, 20.0),
-    ("gate dead", FEW, 0.0, 0.0),
-    ("gates exchanged", FEW, 1.0, 0.0),
-    ("gates exchanged", STANDARD_FEW, 2.0, 0.0),
-    ("chains exchanged", UNLIKE, 0.0, 0.0),
-    ("other number of rods", MORE, -1.0, 0.0),
-    ("other number of rods", FEW, 1.0, 0.0),
-    ("chain upside down", UNLIKE, 0.0, 0.0),
-)
+LAYOUTS = {"few": FEW, "more": MORE, "standard, few": STANDARD_FEW, "unlike": UNLIKE}
 
 
-@pytest.mark.parametrize(("name", "layout", "size", "size_mm"), TOLD)
+@cases
 def test_a_rig_that_is_wrong_in_one_thing_is_told_what_it_is(name, layout, size, size_mm):
     """The rig is the bench's, made from a protocol file and not by what is tested."""
     fault = next(one for one in WRONG_RIGS if one.name == name)
-    text = dict(fault.rigs(layout.protocol()))[size]
+    stated = parse(LAYOUTS[layout].protocol())
+    text = dict(fault.rigs(LAYOUTS[layout].protocol()))[size]
     dials = read_dials({"quiet": "1"} | fault.settings(size))
     one = case(parse(text), dials, run=9)
-    stated = parse(layout.protocol())
     planned = {run.number: run for run in runs(stated)}
     result = replace(one, protocol=stated, run=planned[one.run.number]).analyze()
     assert judged(name, result) in {"right", "likely"}, result.reasons

@@ -36,6 +36,7 @@ from tests.analysis.drops import (
     with_dials,
 )
 from tests.examples import examples
+from tests.tables import cases
 
 MILD = Dials(skew_sd=1e-3)
 QUIET = case(UNIFORM, Dials.quiet(), incline=40.0)
@@ -88,16 +89,7 @@ def test_missed_edges_beyond_the_limit_are_void(rods, verdict):
         assert text == "34 of 660 edges missed (5.2%), limit 5.0%"
 
 
-@pytest.mark.parametrize(
-    ("count", "number", "verdict", "code"),
-    [
-        ("late", 132, "accepted", None),  # of 660 edges a fifth
-        ("late", 133, "marginal", "late_stamps"),
-        ("glitches", 13, "accepted", None),  # and a fiftieth is 13.2
-        ("glitches", 14, "marginal", "short_pulses"),
-        ("overflows", 1, "void", "edges_lost"),
-    ],
-)
+@cases
 def test_what_a_board_counted_is_judged(count, number, verdict, code):
     certificate = Certificate(**{"events": 660, "crc32": 0, "overflows": 0, count: number})
     result = replace(QUIET, drop=replace(QUIET.drop, certificate=certificate)).analyze()

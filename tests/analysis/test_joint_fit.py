@@ -19,6 +19,7 @@ from rig.analysis.session import analyze
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.reader import parse
 from sim.lab import ChainLab
+from tests import tables
 from tests.analysis.drops import STATED, UNIFORM, assert_true, case, with_dials
 from tests.analysis.sessions import MILD, analysis, cases, fit_session, fits
 
@@ -245,18 +246,7 @@ FEW = {f"{one.kind.name}: {one.heights}": one for one in LAYOUTS} | {
 }
 
 
-@pytest.mark.parametrize(
-    ("layout", "dial"),
-    [
-        ("3 rods: 36, 117 + 32.4, 108", {"gate_sd": 0.5e-3}),
-        ("3 rods: 36 + 32.4", {"rod_sd": 0.5e-3}),
-        ("25 rods: 22, 70, 350 + 20, 100, 350", {"impulse_sd": 0.02}),
-        ("25 rods: 22, 70, 350 + 20, 100, 350", {}),
-        ("fence of 8 bars: 72, 240", {"jitter_sd": 1e-5}),
-        ("fence of 8 bars: 72, 240", {}),
-        ("passed while others strike", {"hang_sd": 0.2e-3, "jitter_sd": 2e-6}),
-    ],
-)
+@tables.cases
 def test_where_little_scatters_and_few_gates_tell_of_it_the_joint_fit_settles(layout, dial):
     """What hardly a degree of freedom tells is near what was stated, and does not jump there."""
     protocol = parse(FEW[layout].protocol())

@@ -119,6 +119,11 @@ def counted(monkeypatch):
     return drops
 
 
+def analysed(path):
+    with rig.open(path) as session:
+        return session.analyze()
+
+
 def test_of_a_record_that_was_added_to_only_what_is_new_is_analysed(fence, counted):
     with rig.open(fence) as session:
         before = session.analyze().json()
@@ -126,8 +131,7 @@ def test_of_a_record_that_was_added_to_only_what_is_new_is_analysed(fence, count
     assert len(counted) == 0  # rig run kept it
     with Session.open(fence) as session:
         session.add_state(3, 1, RunState.REJECTED, 0)
-    with rig.open(fence) as session:
-        again = session.analyze()
+    again = analysed(fence)
     assert len(counted) == 0
     assert again.summary[0].n == before["summary"][0]["n"] - 1
     assert again.runs[2].verdict == "rejected"
@@ -140,15 +144,13 @@ def test_a_record_of_which_a_number_was_altered_is_analysed_again(fence, counted
     with unguarded(fence) as connection:
         connection.execute(f"UPDATE {table} SET tick = tick + 1")
     os.utime(fence, ns=(about.st_atime_ns, about.st_mtime_ns))
-    with rig.open(fence) as session:
-        session.analyze()
+    analysed(fence)
     assert len(counted) == 4
 
 
 def test_another_program_computes_itself(fence, counted, monkeypatch):
     monkeypatch.setattr("rig.cache.entry._program", lambda: "another")
-    with rig.open(fence) as session:
-        session.analyze()
+    analysed(fence)
     assert len(counted) == 4
 
 
@@ -158,8 +160,7 @@ def test_another_program_computes_itself(fence, counted, monkeypatch):
 def test_what_is_kept_and_cannot_be_read_is_computed_again(fence, counted, monkeypatch, text):
     with monkeypatch.context() as patch:
         patch.setattr(CacheFolder, "get", lambda *_: text)
-        with rig.open(fence) as session:
-            session.analyze()
+        analysed(fence)
     assert len(counted) == 4
 
 
@@ -175,9 +176,6 @@ def test_a_blind_session_keeps_no_numbers(tmp_path, call):
     text = (PROTOCOLS / "picket-fence.yaml").read_text("utf-8")
     path = record(tmp_path, f"{text}\nblind: true\n", "sim://?seed=3")
     assert CacheFolder().size().entries == 1
-    with rig.open(path) as session:
-        hidden = session.analyze()
-    assert not any("gravity_m_s2" in run.quantities for run in hidden.runs)
+    assert not any("gravity_m_s2" in run.quantities for run in analysed(path).runs)
     call("unblind", path)
-    with rig.open(path) as session:
-        assert session.analyze().runs[0].gravity.u > 0.0
+    assert analysed(path).runs[0].gravity.u > 0.0

@@ -13,20 +13,27 @@ from tests.tables import read_table
 FIELDS = {*read_table(__file__, "fields")["predictions"]}
 
 
-def test_json_has_every_field_of_every_incline(call):
+UNIFORM = PROTOCOLS / "inclined-uniform.yaml"
+
+
+@pytest.fixture
+def predicted(call):
+    """Give what is predicted of a protocol."""
+    return lambda path: json.loads(call("predict", path, "--json").out)["predictions"]
+
+
+def test_json_has_every_field_of_every_incline(predicted):
     """That the numbers are right is for tests/model and tests/test_predictions.py."""
-    path = PROTOCOLS / "inclined-uniform.yaml"
-    lines = json.loads(call("predict", path, "--json").out)["predictions"]
-    assert lines == [one.json() for one in predictions(read(path))]
+    lines = predicted(UNIFORM)
+    assert lines == [one.json() for one in predictions(read(UNIFORM))]
     assert [line["incline_deg"] for line in lines] == list(range(0, 90, 10))
     assert all(line.keys() >= FIELDS for line in lines)
 
 
-def test_the_table_says_the_same(call):
+def test_the_table_says_the_same(call, predicted):
     """In other units, and with U of 95 % for u."""
-    path = PROTOCOLS / "inclined-uniform.yaml"
-    lines = json.loads(call("predict", path, "--json").out)["predictions"]
-    heading, _, *rows = call("predict", path).out.splitlines()
+    lines = predicted(UNIFORM)
+    heading, _, *rows = call("predict", UNIFORM).out.splitlines()
     assert "Δz ± U (cm)" in heading
     assert max(map(len, (heading, *rows))) <= 80
     for line, row in zip(lines, rows[: len(lines)], strict=True):
@@ -36,10 +43,8 @@ def test_the_table_says_the_same(call):
         assert expanded == pytest.approx(196.0 * line["separation_u_m"], rel=0.06)
 
 
-def test_a_given_alpha_needs_no_surface_numbers(call):
-    (line,) = json.loads(call("predict", PROTOCOLS / "bead-chain.yaml", "--json").out)[
-        "predictions"
-    ]
+def test_a_given_alpha_needs_no_surface_numbers(predicted):
+    (line,) = predicted(PROTOCOLS / "bead-chain.yaml")
     assert (line["alpha"], line["gamma"]) == (0.12, 0.0)
     assert line["separation_u_m"] > 0.0
 

@@ -45,6 +45,14 @@ async def told(path, *lines):
 HELLO = rpc.request("hello", {"api": rpc.API, "client": "t"}, 1)
 
 
+async def greeted(path, behind=b""):
+    """Say hello, and what comes behind it, and hear the answer."""
+    reader, writer = await asyncio.open_unix_connection(path)
+    writer.write(HELLO + behind)
+    await reader.readline()
+    return reader, writer
+
+
 async def test_only_the_user_may_come_near(door):
     async with door() as (_server, path):
         assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
@@ -106,9 +114,7 @@ async def test_hello_comes_first(door):
 
 async def test_an_endless_line_ends_the_connection_and_not_the_daemon(door):
     async with door() as (_server, path):
-        reader, writer = await asyncio.open_unix_connection(path)
-        writer.write(HELLO + b"x" * (2 * rpc.REQUEST_LIMIT))
-        await reader.readline()
+        reader, writer = await greeted(path, b"x" * (2 * rpc.REQUEST_LIMIT))
         assert await reader.read() == b""
         writer.close()
         assert (await told(path, HELLO))[0]["result"]["api"] == rpc.API
@@ -338,11 +344,9 @@ async def test_a_worker_that_dies_ends_the_daemon(door, monkeypatch, caplog):
 
 async def test_a_stop_is_read_behind_any_number_of_requests(door, monkeypatch):
     async with door() as (server, path):
-        reader, writer = await asyncio.open_unix_connection(path)
+        reader, writer = await greeted(path)
         control = rpc.request("take_control", {}, 2)
         waits = [rpc.request("wait", {"seconds": 3600}, number) for number in range(3, 300)]
-        writer.write(HELLO)
-        await reader.readline()
         (client,) = server.service.connections
         do = client._do
 
@@ -391,9 +395,7 @@ async def test_a_stop_waits_for_no_more_than_what_is_being_answered(door, monkey
 
 async def test_of_a_client_that_goes_nothing_stays(door):
     async with door() as (server, path):
-        reader, writer = await asyncio.open_unix_connection(path)
-        writer.write(HELLO)
-        await reader.readline()
+        _, writer = await greeted(path)
         writer.close()
         while server._serving:
             await asyncio.sleep(0)

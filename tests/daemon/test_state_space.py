@@ -42,23 +42,29 @@ TROUBLES = [
 
 
 @contextmanager
+def rigged(folder, monkeypatch):
+    """Have a new rig, of which nothing runs any more at the end."""
+    box = Box(folder, monkeypatch)
+    try:
+        yield box
+    finally:
+        if box.worker is not None:
+            box.die()
+
+
+@contextmanager
 def followed(path, folder, monkeypatch):
     """Do one thing after the other in a new rig; `None` when a trouble found no such moment."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
-    with monkeypatch.context() as patch:
-        box = Box(folder, patch)
-        try:
-            struck = True
-            for action, trouble in path:
-                box.trouble = trouble
-                getattr(box, action)()
-                struck, box.trouble = box.trouble is None, None
-                box.check()
-            yield box if struck else None
-        finally:
-            if box.worker is not None:
-                box.die()
+    with monkeypatch.context() as patch, rigged(folder, patch) as box:
+        struck = True
+        for action, trouble in path:
+            box.trouble = trouble
+            getattr(box, action)()
+            struck, box.trouble = box.trouble is None, None
+            box.check()
+        yield box if struck else None
 
 
 def explored(steps, depth, folder, monkeypatch, begin=()):
@@ -106,8 +112,13 @@ def test_nothing_falls_unarmed_is_lost_or_waits_for_ever(tmp_path, monkeypatch):
     assert any(path[-1:] == (("accept", None),) for path in found.values())
 
 
-def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(tmp_path, monkeypatch):
-    box = Box(tmp_path, monkeypatch)
+@pytest.fixture
+def box(tmp_path, monkeypatch):
+    with rigged(tmp_path, monkeypatch) as box:
+        yield box
+
+
+def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(box):
     box.arm()
     assert box.worker.published.get("phase") == "armed"
     box.worker.controller.close()
@@ -126,11 +137,9 @@ def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(tmp_path, monkeyp
     another.close()
     assert box.phase is Phase.HOLDING
     box.ends_well()
-    box.kill()
 
 
-def test_what_a_test_of_the_release_left_on_the_board_is_in_nobodys_way(tmp_path, monkeypatch):
-    box = Box(tmp_path, monkeypatch)
+def test_what_a_test_of_the_release_left_on_the_board_is_in_nobodys_way(box):
     box.board.lab.drop = lambda _label: []
     device, label = box.worker.controller.recorder.device, pack_label(TEST_RUN, 1)
     order = {"gates": 3, "release": 1, "pulse_us": 80_000, "timeout_ms": 1000, "record_ms": 180}
@@ -141,11 +150,9 @@ def test_what_a_test_of_the_release_left_on_the_board_is_in_nobodys_way(tmp_path
     box.resume()
     assert box.phase is Phase.IDLE
     assert isinstance(box.arm(), int)
-    box.kill()
 
 
-def test_a_drop_that_a_restart_of_the_board_cut_is_shown_as_interrupted(tmp_path, monkeypatch):
-    box = Box(tmp_path, monkeypatch)
+def test_a_drop_that_a_restart_of_the_board_cut_is_shown_as_interrupted(box):
     box.arm()
 
     def falls(label):
@@ -162,8 +169,7 @@ def test_a_drop_that_a_restart_of_the_board_cut_is_shown_as_interrupted(tmp_path
     box.ends_well()
 
 
-def test_who_is_held_up_says_by_what_and_whether_anything_is_armed(tmp_path, monkeypatch):
-    box = Box(tmp_path, monkeypatch)
+def test_who_is_held_up_says_by_what_and_whether_anything_is_armed(box, monkeypatch):
     worker = box.worker
 
     def stalled(since_s, disk_s):
@@ -177,11 +183,10 @@ def test_who_is_held_up_says_by_what_and_whether_anything_is_armed(tmp_path, mon
     box.arm()
     armed = [stalled(2.0 * STALL_S, disk_s) for disk_s in (0.0, 1.0)]
     assert armed == ["held_up_armed", "disk_slow_armed"]
-    box.kill()
 
 
-def test_what_fails_is_in_the_state_before_it_is_answered(tmp_path, monkeypatch):
-    box, seen = Box(tmp_path, monkeypatch), []
+def test_what_fails_is_in_the_state_before_it_is_answered(box):
+    seen = []
     box.arm()
 
     def fail(_):
@@ -192,30 +197,25 @@ def test_what_fails_is_in_the_state_before_it_is_answered(tmp_path, monkeypatch)
     box.turned()
     assert seen == ["the disk is full"]
     assert box.board._controller.phase is not Phase.ARMED, "what cannot be kept must not fall"
-    box.kill()
 
 
-def test_stop_answers_what_waits(tmp_path, monkeypatch):
-    box = Box(tmp_path, monkeypatch)
+def test_stop_answers_what_waits(box):
     waiting = [box.worker.submit(lambda c: c.opened, "A") for _ in range(2)]
     box.stop()
     assert all(isinstance(one.exception(timeout=0.0), StoppedError) for one in waiting)
-    box.kill()
 
 
-def test_a_session_that_is_opened_ends_the_trouble_of_the_one_before(tmp_path, monkeypatch):
-    box, seen = Box(tmp_path, monkeypatch), []
+def test_a_session_that_is_opened_ends_the_trouble_of_the_one_before(box):
+    seen = []
     names = str(box.protocol), str(box.session)
     box.worker._weigh(SessionError("the disk is full", "make room"))
     outcome = box.worker.submit(lambda c: c.open_session(*names), "A", writes=False)
     outcome.add_done_callback(lambda _: seen.append(box.worker._trouble))
     box.turned()
     assert seen == [None], "before it is answered"
-    box.kill()
 
 
-def test_stop_ends_the_search_for_a_board_that_does_not_answer(tmp_path, monkeypatch):
-    box = Box(tmp_path, monkeypatch)
+def test_stop_ends_the_search_for_a_board_that_does_not_answer(box):
     box.worker.controller.disconnect()
     box.trouble = Trouble("stopped", "write", 2)
     box.deaf_until_ns = box.clock.now_ns() + 60 * 10**9
@@ -225,7 +225,6 @@ def test_stop_ends_the_search_for_a_board_that_does_not_answer(tmp_path, monkeyp
     box.turned()
     assert isinstance(outcome.exception(), StoppedError)
     assert ended_s[0] - begun_s < 3.0
-    box.kill()
 
 
 @pytest.mark.slow

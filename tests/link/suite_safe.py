@@ -124,18 +124,22 @@ class SilenceSuite(Suite):
         assert heard == [(0, wire.Disarmed(LABEL, wire.DisarmReason.HOST_SILENT))]
 
 
+def turn(stoppable, stopped: bool) -> None:
+    """Open or close the emergency stop, and wait until it acts."""
+    stoppable.stop(stopped)
+    stoppable.clock().sleep(1e-3)
+
+
 class StopSuite(Suite):
     def test_an_open_stop_forbids_arming(self, stoppable, device):
-        stoppable.stop(True)
-        stoppable.clock().sleep(1e-3)  # it acts within that
+        turn(stoppable, True)
         assert "emergency stop" in self.refused(wire.RefusalReason.STOPPED, arm, device).message
         self.refused(wire.RefusalReason.STOPPED, arm, device, release=0, pulse_us=0)
         self.refused(wire.RefusalReason.BAD_PARAMETER, arm, device, gates=0)
         stoppable.lab.hanging = 1
         self.refused(wire.RefusalReason.STOPPED, arm, device)
         stoppable.lab.hanging = 0
-        stoppable.stop(False)
-        stoppable.clock().sleep(1e-3)
+        turn(stoppable, False)
         device.fire(arm(device))
 
     def test_opening_it_disarms(self, stoppable, device):
@@ -180,8 +184,7 @@ class StopSuite(Suite):
     def spike(self, stoppable, width):
         stoppable.stop(True)
         stoppable.clock().sleep(width)
-        stoppable.stop(False)
-        stoppable.clock().sleep(1e-3)
+        turn(stoppable, False)
 
     def test_a_drop_is_read_while_it_is_open(self, stoppable, device):
         drop = self.drop(device)
@@ -219,11 +222,9 @@ class CoolingSuite(Suite):
 
     def test_an_open_stop_comes_before_cooling(self, stoppable, device):
         self.release(device, self.drop(device, pulse_us=50_000, record_ms=60))
-        stoppable.stop(True)
-        stoppable.clock().sleep(1e-3)  # it acts within that
+        turn(stoppable, True)
         self.refused(wire.RefusalReason.STOPPED, arm, device)
-        stoppable.stop(False)
-        stoppable.clock().sleep(1e-3)
+        turn(stoppable, False)
         self.refused(wire.RefusalReason.COOLING, arm, device)
 
 

@@ -1,6 +1,7 @@
 """Files that somebody sent, altered, old or of a broken board: read or refused in plain words."""
 
 import json
+import shutil
 import sqlite3
 from contextlib import closing
 
@@ -30,6 +31,16 @@ from tests.tables import cases
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory):
     return make_session(tmp_path_factory.mktemp("sound"))
+
+
+@pytest.fixture
+def copied(sound, tmp_path):
+    return shutil.copy(sound, tmp_path / "copied")
+
+
+def run_sql(path, sql):
+    with closing(sqlite3.connect(path)) as connection:
+        connection.executescript(sql)
 
 
 @pytest.fixture
@@ -78,33 +89,25 @@ def test_any_protocol_is_read_or_refused(tmp_path):
 
 
 @cases
-def test_a_file_of_another_build_is_refused_before_a_row_is_read(sql, sound, tmp_path, call):
-    path = tmp_path / "altered"
-    path.write_bytes(sound.read_bytes())
-    with closing(sqlite3.connect(path)) as connection:
-        connection.executescript(sql)
+def test_a_file_of_another_build_is_refused_before_a_row_is_read(sql, copied, call):
+    run_sql(copied, sql)
     for readonly in (True, False):
         with pytest.raises(SessionError, match="built or altered by another program"):
-            Session.open(path, readonly=readonly)
-    assert "rig cannot read it" in call("recover", path, code=SessionError.exit_code).out
+            Session.open(copied, readonly=readonly)
+    assert "rig cannot read it" in call("recover", copied, code=SessionError.exit_code).out
 
 
 @cases
-def test_a_value_of_the_wrong_form_is_refused(sql, what, sound, tmp_path):
-    path = tmp_path / "altered"
-    path.write_bytes(sound.read_bytes())
-    with unguarded(path) as connection:
+def test_a_value_of_the_wrong_form_is_refused(sql, what, copied):
+    with unguarded(copied) as connection:
         connection.execute("PRAGMA ignore_check_constraints = ON")
         connection.execute(sql)
-    refused(SessionError, what, read_through, path)
+    refused(SessionError, what, read_through, copied)
 
 
-def test_what_somebodys_analyze_leaves_is_no_harm(sound, tmp_path):
-    path = tmp_path / "analysed"
-    path.write_bytes(sound.read_bytes())
-    with closing(sqlite3.connect(path)) as connection:
-        connection.execute("ANALYZE")
-    read_through(path)
+def test_what_somebodys_analyze_leaves_is_no_harm(copied):
+    run_sql(copied, "ANALYZE")
+    read_through(copied)
 
 
 def test_a_statement_that_runs_away_is_ended(sound, monkeypatch):
@@ -113,18 +116,16 @@ def test_a_statement_that_runs_away_is_ended(sound, monkeypatch):
     refused(SessionError, "far longer to read than any session", read_through, sound)
 
 
-def test_more_edges_than_the_certificate_allows_are_not_read(sound, tmp_path):
-    path = tmp_path / "more"
-    path.write_bytes(sound.read_bytes())
-    with closing(sqlite3.connect(path)) as connection:
-        connection.executescript(
-            'INSERT INTO edge SELECT "drop", idx + 1000, tick, channel, blocked FROM edge, '
-            "(WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 40) "
-            "SELECT i * 1000 AS more FROM n) WHERE 0; "
-            "WITH RECURSIVE n(i) AS (SELECT 1000 UNION ALL SELECT i + 1 FROM n WHERE i < 3000) "
-            "INSERT INTO edge SELECT 1, i, i, 0, 1 FROM n;"
-        )
-    refused(SessionError, "run 1, attempt 1: it has more than", read_through, path)
+def test_more_edges_than_the_certificate_allows_are_not_read(copied):
+    run_sql(
+        copied,
+        'INSERT INTO edge SELECT "drop", idx + 1000, tick, channel, blocked FROM edge, '
+        "(WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 40) "
+        "SELECT i * 1000 AS more FROM n) WHERE 0; "
+        "WITH RECURSIVE n(i) AS (SELECT 1000 UNION ALL SELECT i + 1 FROM n WHERE i < 3000) "
+        "INSERT INTO edge SELECT 1, i, i, 0, 1 FROM n;",
+    )
+    refused(SessionError, "run 1, attempt 1: it has more than", read_through, copied)
 
 
 HZ = 16_000_000

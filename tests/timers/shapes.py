@@ -79,6 +79,9 @@ def levels(edges: Truth, time: float) -> list[int]:
     ]  # fmt: skip
 
 
+LEVELS = table([f"{t:.6f}", *levels(RUNS[0], t)] for t, _, _ in RUNS[0])
+"""Time and the state of each gate, at each edge of the first run."""
+
 STEP = 2e-4
 TIMES = 0.35 + STEP * np.arange(2000)
 """Moments, s, of samples: from before the first edge of the first run until after its last."""
@@ -116,8 +119,10 @@ def vcd(edges: Truth) -> str:
     return f"{head}{wires}$upscope $end\n$enddefinitions $end\n{zero}{changes}"
 
 
+PLACES = ("top", "upper", "lower", "bottom")
 ROWS = json.loads(Path(__file__).with_name("rows.json").read_text("utf-8"))
-"""What stands above, a row, words for blocked and clear, how many runs, what is below, marks."""
+"""What stands above, a row, words for blocked and clear, how many runs, what is below, marks; of
+scopes what stands above, a row, how a value is written, what parts them, whether they are bare."""
 
 
 def write(form: str, words: str = "", runs=RUNS[:1], mark: str = "") -> str:
@@ -131,6 +136,7 @@ def write(form: str, words: str = "", runs=RUNS[:1], mark: str = "") -> str:
             values = {"s": s, "ms": ms, "S": s.replace(".", ","), "MS": ms.replace(".", ",")}
             values |= {"us": round(t * 1e6), "coarse": f"{t * 1e3:.0f}", "d": int(dark)}
             values |= {"no": int(not dark), "w": blocked if dark else clear}
+            values |= {"next": c + 1, "letter": "ABCD"[c], "place": PLACES[c]}
             rows.append(form.format(n=n, k=k, c=c, **values))
     return "".join(rows)
 
@@ -143,10 +149,22 @@ def from_rows(group: str) -> dict[str, Shape]:
     }
 
 
+def scope_of(head: str, form: str, value: str, separator: str, bare: bool) -> Shape:
+    def row(k, t, v):
+        values = separator.join(map(value.format, v))
+        return form.format(k=k, t=t, ms=t * 1e3, v=values)
+
+    return scope(head, row, bare=bare)
+
+
+def from_scopes(group: str) -> dict[str, Shape]:
+    return {name: scope_of(*row) for name, row in ROWS[group].items()}
+
+
 @cache
 def shapes() -> dict[str, Shape]:
     """Return every shape by its name."""
-    found = from_rows("shapes")
+    found = from_rows("shapes") | from_scopes("scopes")
     found["cp1252"] = text(found["cp1252"].content.decode(), encoding="cp1252")
 
     def states(n):
@@ -168,8 +186,7 @@ def shapes() -> dict[str, Shape]:
                 for three in zip(*RUNS, strict=True)), 3)  # fmt: skip
     found["SPARKvue"] = text(
         '"Time (s)","Gate 0 State (Blocked/Unblocked)",'
-        '"Gate 1 State","Gate 2 State","Gate 3 State"\n'
-        + table([f"{t:.6f}", *levels(RUNS[0], t)] for t, _, _ in RUNS[0])
+        '"Gate 1 State","Gate 2 State","Gate 3 State"\n' + LEVELS
     )
     found["Vernier Format 2"] = text("".join(
         f"Vernier Format 2\nfall.cmbl\nRun {n}\nTime\tGate 0\tGate 1\tGate 2\tGate 3\n"
@@ -188,38 +205,6 @@ def shapes() -> dict[str, Shape]:
         + " ".join(f"gate{g}:{v}" for g, v in enumerate(levels(RUNS[0], t)))
         + "\n"
         for t, _, _ in [(0.0, 0, False), *RUNS[0]]))  # fmt: skip
-    found["Siglent SDS"] = scope(
-        "Record Length,Analog:2000\nSample Interval,2.0E-04\n"
-        "Vertical Units,CH1:V,CH2:V,CH3:V,CH4:V\n"
-        "Vertical Scale,CH1:1.00,CH2:1.00,CH3:1.00,CH4:1.00\n"
-        "Horizontal Units,S\nModel Number,SDS1104X-E\n"
-        "Source,CH1,CH2,CH3,CH4\nSecond,Volt,Volt,Volt,Volt\n",
-        csv,
-    )
-    found["Tektronix MDO"] = scope(
-        "Model,MDO3024\nFirmware Version,1.26\n\nPoint Format,Y,\nHorizontal Units,S,\n"
-        "Sample Interval,2e-04,\nRecord Length,2000,\n,,\n\nTIME,CH1,CH2,CH3,CH4\n",
-        csv,
-    )
-    found["LeCroy"] = scope(
-        "LECROYHDO4104,1234,Waveform\nSegments,1,SegmentSize,2000\nSegment,TrigTime,TimeSinceSegment1\n"
-        "#1,22-Jan-2015 11:35:11,0\nTime,Ampl1,Ampl2,Ampl3,Ampl4\n",
-        csv,
-    )
-    found["Rigol DS1000Z"] = scope(
-        "X,CH1,CH2,CH3,CH4,Start,Increment,\nSequence,Volt,Volt,Volt,Volt,0.000000e+00,2.000000e-04\n",
-        lambda k, t, v: f"{k}," + ",".join(f"{x:.2e}" for x in v) + ",\n",
-    )
-    found["Rigol MSO5000"] = scope(
-        "CH1V,CH2V,CH3V,CH4V,t0 =0.0000s, tInc = 2.000000e-04,\n",
-        lambda k, t, v: ",".join(f"{x:.3f}" for x in v) + ",,\n",
-        bare=True,
-    )
-    found["OWON"] = scope(
-        "Unit:(mV)\nSample interval:2.0e-04s\n"
-        "index,CH1_Voltage(V),CH2_Voltage(V),CH3_Voltage(V),CH4_Voltage(V)\n",
-        lambda k, t, v: f"{k}," + ",".join(f"{x:.3f}" for x in v) + "\n",
-    )
     found["OWON in microseconds"] = scope(
         "Channel\t\t:,CH1,CH2,CH3,CH4\nFrequency\t:,F=?,F=?,F=?,F=?\n"
         "Vertical pos\t:,0.00mV,0.00mV,0.00mV,0.00mV\nTime interval\t:,200.00uS\n\n"
@@ -232,17 +217,6 @@ def shapes() -> dict[str, Shape]:
         "#Vertical Units,V,V,V,V\n#Label,,,,\nTIME,D0,D1,D2,D3\n"
         + "".join(f"{t:.4e}," + ",".join(map(str, levels(RUNS[0], t))) + "\n"
                   for t in TIMES)).encode(), RUNS[:1], sampled=STEP)  # fmt: skip
-    found["Hantek"] = scope("nr,time,ch1,ch2,ch3,ch4\n",
-        lambda k, t, v: f"{k},{t:.6g}," + ",".join(f"{x:.2f}" for x in v) + "\n")  # fmt: skip
-    found["PicoScope"] = scope(
-        "Time,Channel A,Channel B,Channel C,Channel D\n(ms),(V),(V),(V),(V)\n\n",
-        lambda k, t, v: ",".join([f"{t * 1e3:.8f}", *(f"{x:.8f}" for x in v)]) + "\n",
-    )
-    found["Digilent"] = scope(
-        "#Digilent WaveForms Oscilloscope Acquisition\n#Sample rate: 5000Hz\n#Samples: 2000\n\n"
-        "Time (s),Channel 1 (V),Channel 2 (V),Channel 3 (V),Channel 4 (V)\n",
-        csv,
-    )
     lvm = (
         "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\n"
         "Decimal_Separator\t{}\nMulti_Headings\tNo\nX_Columns\t{}\nTime_Pref\tRelative\n"
@@ -311,9 +285,7 @@ def shapes() -> dict[str, Shape]:
     found["VCD"] = text(vcd(RUNS[0]))
     zeros = "#0\n" + "".join(f"0{mark}\n" for mark in "!#$%")
     found["VCD from its first change"] = text(vcd(RUNS[0]).replace(zeros, ""))
-    found["Levels without a heading"] = text(
-        table([f"{t:.6f}", *levels(RUNS[0], t)] for t in (0, *(t for t, _, _ in RUNS[0])))
-    )
+    found["Levels without a heading"] = text("0.000000,0,0,0,0\n" + LEVELS)
     found["Time at each gate"] = Shape(
         (
             ",".join(f"Time at gate {g} (s)" for g in HEIGHTS)

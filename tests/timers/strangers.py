@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tests.timers.shapes import (
     HEIGHTS,
+    LEVELS,
     RUNS,
     STEP,
     TIMES,
@@ -11,6 +12,7 @@ from tests.timers.shapes import (
     by_gate,
     csv,
     from_rows,
+    from_scopes,
     levels,
     scope,
     table,
@@ -28,17 +30,15 @@ def strangers() -> dict[str, Shape]:
     def put(name, content, truth=RUNS[:1], **more) -> None:
         files[name] = Shape(content.encode(), truth, **more)
 
-    files |= from_rows("strangers")
+    files |= from_rows("strangers") | from_scopes("strange scopes")
     each = [write("{c},{s},{d}\n", runs=[edges]) for edges in RUNS]
+    numbered = table([n, *(f"{t:.6f}" for t, _, _ in edges)] for n, edges in enumerate(RUNS, 1))
+    passings = table([c, f"{a[0]:.6f}", f"{b[0]:.6f}"] for c, (a, b) in by_gate(one).items())
     for name, content in (
         ("Runs by blank lines", GTS + "\n".join(each)),
-        ("Runs by a marker in words", GTS + "".join(
-            f"Versuch {n}:\n{rows}" for n, rows in enumerate(each, 1))),
-        ("Runs by a remark", "".join(f"# Trial {n}\n{rows}" for n, rows in enumerate(each, 1))),
         ("Runs by a title", "\n".join(
             f"Run {n} of 3\n{GTS}{rows}" for n, rows in enumerate(each, 1))),
         ("Runs by a word alone", "".join(f"START\n{rows}STOP\n" for rows in each)),
-        ("Runs by a repeated heading", "".join(GTS + rows for rows in each)),
         ("Runs by gaps", "time_s,gate,blocked\n" + "".join(
             f"{t + 12 * n:.6f},{c},{int(d)}\n" for n, edges in enumerate(RUNS)
             for t, c, d in edges)),
@@ -52,20 +52,17 @@ def strangers() -> dict[str, Shape]:
          + table([f"{t:.6f}" for t, _, _ in edges] for edges in RUNS)),
         ("Pairs in German", "Versuch;" + ";".join(f"L{g} {w} (s)" for g in HEIGHTS
          for w in ("an", "aus")) + "\n"
-         + table(([n, *(f"{t:.6f}" for t, _, _ in edges)]
-                  for n, edges in enumerate(RUNS, 1)), ";")),
+         + numbered.replace(",", ";")),
         ("Gates over pairs of columns", "," + ",,".join(f"Gate {g}" for g in HEIGHTS) + ",\n"
          + "Run," + ",".join(["in (s),out (s)"] * len(HEIGHTS)) + "\n"
-         + table([n, *(f"{t:.6f}" for t, _, _ in edges)] for n, edges in enumerate(RUNS, 1))),
+         + numbered),
         ("A sum beside pairs of columns", ",,".join(f"Gate {g}" for g in HEIGHTS) + ",,\n"
          + ",".join(["in (s),out (s)"] * len(HEIGHTS)) + ",all (s)\n"
          + table([*(f"{t:.6f}" for t, _, _ in edges), "0.3"] for edges in RUNS)),
         ("A name for two columns", "run," + ",,".join(f"Gate {g} (s)" for g in HEIGHTS) + ",\n"
-         + table([n, *(f"{t:.6f}" for t, _, _ in edges)] for n, edges in enumerate(RUNS, 1))),
+         + numbered),
         ("Times of a row, numbered", "drop," + ",".join(f"t{k}" for k in range(1, 9)) + "\n"
-         + table([n, *(f"{t:.6f}" for t, _, _ in edges)] for n, edges in enumerate(RUNS, 1))),
-        ("A word for gates that is unknown", "Prova;Traguardo;Tempo (s);Stato\n"
-         + write("{n};{c};{S};{d}\n", runs=RUNS)),
+         + numbered),
         ("A list for each run", "[[" + "],\n [".join(
             ", ".join(f"{t:.6f}" for t, _, _ in edges) for edges in RUNS) + "]]\n"),
     ):  # fmt: skip
@@ -73,19 +70,11 @@ def strangers() -> dict[str, Shape]:
     for name, content in (
         ("Units that change", "gate,time,state\n" + write("{c},{ms} ms,{d}\n", runs=[one[:4]])
          + write("{c},{s} s,{d}\n", runs=[one[4:]])),
-        ("Tuples", "".join(f"({t:.6f}, {c}, {d})\n" for t, c, d in one)),
-        ("Dictionaries", "".join(
-            f"{{'gate': {c}, 't': {t:.6f}, 'blocked': {d}}}\n" for t, c, d in one)),
-        ("Gates from 1", GTS + "".join(f"{c + 1},{t:.6f},{int(d)}\n" for t, c, d in one)),
-        ("Gates by letters", GTS + "".join(f"{'ABCD'[c]},{t:.6f},{int(d)}\n" for t, c, d in one)),
-        ("Gates by names", GTS + "".join(
-            f"{('top', 'upper', 'lower', 'bottom')[c]},{t:.6f},{int(d)}\n" for t, c, d in one)),
         ("Cells without a number", "time (s),gate 0,gate 1,gate 2,gate 3\n" + table(
             [f"{t:.6f}", *(int(d) if g == c else "NaN" for g in HEIGHTS)] for t, c, d in one)),
         ("Times of gates with NaN", "gate 0 (s),gate 1 (s),gate 2 (s),gate 3 (s)\n" + table(
             [f"{t:.6f}" if g == c else "NaN" for g in HEIGHTS] for t, c, d in one)),
-        ("A row for each gate", "gate,blocked (s),unblocked (s)\n" + table(
-            [c, f"{a[0]:.6f}", f"{b[0]:.6f}"] for c, (a, b) in by_gate(one).items())),
+        ("A row for each gate", "gate,blocked (s),unblocked (s)\n" + passings),
         ("Rows out of order", GTS + write("{c},{s},{d}\n", runs=[[*one[4:], *one[:4]]])),
         ("Newest first", GTS + write("{c},{s},{d}\n", runs=[one[::-1]])),
         ("A clock that overflows", "gate,time (us),state\n" + "".join(
@@ -94,9 +83,6 @@ def strangers() -> dict[str, Shape]:
             f"{t * 1e6:.0f},{''.join(map(str, levels(one, t)))}\n" for t, _, _ in one)),
         ("Twice the same", 2 * (GTS + each[0])),
         ("Changes in nanoseconds", vcd(one).replace("1 us", "1 ns")),
-        ("Written by hand", "first drop\ngate 0: in 0,4110 out 0,4308\n"),
-        ("Thousands apart", "gate;time (us);state\n" + "".join(
-            f"{c};{round(t * 1e6):,};{int(d)}\n" for t, c, d in one)),
         ("Thousands by points", "Kanal;Zeit (µs);Zustand\n" + "".join(
             f"{c};{round(t * 1e6):,};{int(d)}\n".replace(",", ".") for t, c, d in one)),
         ("JSON in a line", "[" + ", ".join(
@@ -107,11 +93,6 @@ def strangers() -> dict[str, Shape]:
         ("A month that ends", "gate,time,state\n" + "".join(
             f"{c},2026-{'11-30 23:59' if t < 0.5 else '12-01 00:00'}:{(t - 0.5) % 60:.6f}"
             f",{int(d)}\n" for t, c, d in one)),
-        ("Seconds that are called minutes", GTS.replace("(s)", "(min)") + each[0]),
-        ("A clock before values", write("14:03:2{s} -> {c},{d},{us}\n")),
-        ("Clear or not", GTS.replace("state", "clear") + write("{c},{s},{no}\n")),
-        ("A word for states that is unknown", "tijd (ms);sensor;toestand\n"
-         + write("{MS};{c};{d}\n")),
         ("A row twice", GTS + each[0] + each[0].splitlines()[-1]),
         ("The last row cut", GTS + each[0][:-3]),
     ):  # fmt: skip
@@ -130,8 +111,7 @@ def strangers() -> dict[str, Shape]:
     )
     put(
         "A state without a name",
-        "Time (s),State 0,State 1,,State 3\n0.000000,0,0,0,0\n"
-        + table([f"{t:.6f}", *levels(one, t)] for t, _, _ in one),
+        "Time (s),State 0,State 1,,State 3\n0.000000,0,0,0,0\n" + LEVELS,
     )
     time, channel, dark = one[3]
     bounce = [(time + 2e-6, channel, not dark), (time + 4e-6, channel, dark)]
@@ -148,33 +128,17 @@ def strangers() -> dict[str, Shape]:
     put("Samples of a channel for all gates", "time (s),state\n" + "".join(
         f"{n * 1e-3:.3f},{max(levels(one, n * 1e-3))}\n" for n in range(800)),
         sampled=1e-3)  # fmt: skip
-    for name, head, separator, form in (
-        ("Names repeated", "Time,Ampl,Ampl,Ampl,Ampl\n", ",", "{:.4e}"),
-        ("Units in words", "Time,CH1,CH2,CH3,CH4\nin s,in V,in V,in V,in V\n", ",", "{:.4e}"),
-        ("LabVIEW, inputs without names", "time\tY[0]\tY[1]\tY[2]\tY[3]\n", "\t", "{:.6f}"),
-        ("LabVIEW, X", "X,Y[0],Y[1],Y[2],Y[3]\n", ",", "{:.6f}"),
-        ("LabVIEW, untitled", "X_Value,Untitled,Untitled 1,Untitled 2,Untitled 3\n", ",", "{:.6f}"),
-        ("LabJack", "Time\tAIN0\tAIN1\tAIN2\tAIN3\n", "\t", "{:.6f}"),
-        ("Light", "t (s);Light 0 (lx);Light 1 (lx);Light 2 (lx);Light 3 (lx)\n", ";", "{:.5f}"),
-        ("Counts of a converter", "t(s) A0 A1 A2 A3\n", " ", "{:.4f}"),
-        ("Decimal commas", "Zeit [s]\tU0 [V]\tU1 [V]\tU2 [V]\tU3 [V]\n", "\t", "{:,.5f}"),
-    ):  # fmt: skip
-        point = "," if "," in form else "."
-        files[name] = scope(head, lambda k, t, v, s=separator, f=form, p=point: s.join(
-            f.replace(",", "").format(x).replace(".", p) for x in (t, *v)) + "\n")  # fmt: skip
+    files["Decimal commas"] = scope(
+        "Zeit [s]\tU0 [V]\tU1 [V]\tU2 [V]\tU3 [V]\n",
+        lambda k, t, v: table([[f"{x:.5f}" for x in (t, *v)]], "\t").replace(".", ","),
+    )
     files["Axes by numbers"] = scope(
         "x-axis,1,2,3,4\nsecond,Volt,Volt,Volt,Volt\n", csv, options=("map", "1=0,2=1,3=2,4=3")
     )
-    for name, head, row in (
-        ("An array of volts without a heading", "# Created by Octave 8.4.0\n",
-         lambda k, t, v: " ".join(f"{x:.3e}" for x in (t, *v)) + "\n"),
-        ("Exponents of Fortran", "# t(s) A0 A1 A2 A3\n",
-         lambda k, t, v: " ".join(f"{x:.5E}" for x in (t, *v)).replace("E", "D") + "\n"),
-        ("Yokogawa", '"TraceName","CH1","CH2","CH3","CH4"\n"VUnit","V","V","V","V"\n'
-         '"HResolution",2e-04,2e-04,2e-04,2e-04\n"HUnit","s","s","s","s"\n\n',
-         lambda k, t, v: "," + ",".join(f"{x:.4e}" for x in v) + ",\n"),
-    ):  # fmt: skip
-        files[name] = scope(head, row, bare="Yoko" in name)
+    files["Exponents of Fortran"] = scope(
+        "# t(s) A0 A1 A2 A3\n",
+        lambda k, t, v: table([[f"{x:.5E}".replace("E", "D") for x in (t, *v)]], " "),
+    )
     put(
         "DSView",
         "; Sample rate: 1 MHz\nTime(s), 0, 1, 2, 3\n"
@@ -190,17 +154,13 @@ def strangers() -> dict[str, Shape]:
     )
     put(
         "More names than columns",
-        "gate,blocked (s),clear (s),foo\n"
-        + table([c, f"{a[0]:.6f}", f"{b[0]:.6f}"] for c, (a, b) in by_gate(one).items()),
+        "gate,blocked (s),clear (s),foo\n" + passings,
     )
     put(
         "A row for each gate that is passed",
         "n,start (s),end (s)\n"
         + table([c + 1, f"{a[0]:.6f}", f"{b[0]:.6f}"] for c, (a, b) in by_gate(one).items()),
     )
-    files["Rows of a period"] = scope(
-        "Memory Length,2000,\nSampling Period,2e-04,\nCH1,CH2,CH3,CH4,\n",
-        lambda k, t, v: ",".join(f"{x:.4f}" for x in v) + ",\n", bare=True)  # fmt: skip
     return files
 
 

@@ -14,6 +14,7 @@ from rig.records import Drop, Edge
 from rig.timers import lines
 from rig.timers.edge_rows import edges_text, read_edges
 from rig.timers.moments import TICK_HZ
+from tests.tables import cases
 
 HEADER = "run,channel,time_s,state\n"
 
@@ -77,38 +78,8 @@ def test_channels_one_after_another_are_merged_stably(tmp_path: Path) -> None:
     assert second.edges == (Edge(5 * 10**11, 0, False),)
 
 
-@pytest.mark.parametrize(
-    ("row", "column", "key"),
-    [
-        ("0,0,0,1", 1, "run"),
-        ("-1,0,0,1", 1, "run"),
-        ("1.0,0,0,1", 1, "run"),
-        (",0,0,1", 1, "run"),
-        ("1_0,0,0,1", 1, "run"),
-        ("9999999999999,0,0,1", 1, "run"),
-        ("1,16,0,1", 3, "channel"),
-        ("1,-1,0,1", 3, "channel"),
-        ("1,  x,0,1", 5, "channel"),
-        ("1,0,nan,1", 5, "time_s"),
-        ("1,0,inf,1", 5, "time_s"),
-        ("1,0,,1", 5, "time_s"),
-        ("1,0,.,1", 5, "time_s"),
-        ("1,0,e5,1", 5, "time_s"),
-        ("1,0,1e999,1", 5, "time_s"),
-        ("1,0,1e30,1", 5, "time_s"),
-        ("1,0,0x1,1", 5, "time_s"),
-        ('1,0,"1,5",1', 6, "time_s"),
-        ("1,0,0,2", 7, "state"),
-        ('1,"0",0, blocked', 10, "state"),
-        ("1,0,0", 1, ""),
-        ("1,0,0,1,5", 1, ""),
-        ("1;0;0;1", 1, ""),
-        ('1,0,"0,1', 1, ""),
-        ("1,0,3601.5,1", 5, "time_s"),
-        ("1,7,0.9,1", 5, "time_s"),
-    ],
-)
-def test_faults_are_located(tmp_path: Path, row: str, column: int, key: str) -> None:
+@cases
+def test_faults_of_a_row_are_located(tmp_path: Path, row: str, column: int, key: str) -> None:
     good = "1,7,1,1\n"
     assert faults(tmp_path, f"{HEADER}# note\n{good}{row}\n") == [(4, column, key)]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from itertools import compress, pairwise
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -19,6 +19,7 @@ from rig.timers.lines import read_lines
 from rig.timers.moments import TICK_HZ
 from rig.timers.timer_file import TimerFile, read_file
 from tests.examples import examples
+from tests.tables import cases
 from tests.timers.test_edges_csv import faults_of
 from tests.timers.test_edges_csv import read as read_own
 
@@ -47,20 +48,7 @@ def told(drop: Drop) -> list[tuple[float, bool]]:
     return [(edge.tick / TICK_HZ, edge.blocked) for edge in drop.edges]
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        "0.25,1\n0.26,0\n0.275,1\n",
-        "0.25\t1\n0.26\t0\n0.275\t1\n",
-        "0,25;1\n0,26;0\n0,275;1\n",
-        "Time (ms),Blocked?\n250,Blocked\n260,Unblocked\n275,Blocked\n",
-        "\ufeffLatest: Time (s),Latest: GateState\r\n0.25,1\r\n0.26,0\r\n0.275,1\r\n",
-        "State,Time (s)\n1,0.25\n0,0.26\n1,0.275\n",
-        '"Zeit t (s)";"Zustand"\n"0,25";"1"\n"0,26";"0"\n"0,275";"1"\n',
-        "Time\tState\ns\t\n0.25\t1.0\n0.26\t0.0\n0.275\t1.0\n",
-        "t (µs);state\n250000;1\n260000;0\n2,75e5;1\n",
-    ],
-)
+@cases
 def test_what_programs_write(tmp_path, text):
     (drop,) = read(tmp_path, text)
     assert told(drop) == [(0.25, True), (0.26, False), (0.275, True)]
@@ -80,37 +68,16 @@ def test_a_column_of_times_is_of_darkening_or_of_both(tmp_path, text):
 faults = partial(faults_of, read)
 
 
-@pytest.mark.parametrize(
-    ("text", "place"),
-    [
-        ("Time,State\n0.1,1\n0.2,maybe\n", (3, 5, "state")),
-        ("Time,State\n0.1,1\nx,0\n", (3, 1, "time")),
-        ("Time,State\n0.1,x\n0.2,0\n", (2, 5, "state")),
-        ("0.1,x\n0.2,0\n", (1, 5, "edge")),
-        ("Time,Blocked\n0.1,low\n0.2,0\n0.3,1\n", (2, 5, "state")),
-        ("Distance,State\n0.2,1\n", (1, 1, "")),
-        ("", (1, 1, "")),
-        ("nothing here\n", (1, 1, "")),
-        ("Time;State\n0,1;1\n0,2;0\n0,3,4;1\n", (4, 1, "time")),
-    ],
-)
-def test_faults_are_located(tmp_path, text, place):
-    assert place in faults(tmp_path, text)
+@cases
+def test_faults_are_located(tmp_path, text, line, column, key):
+    assert (line, column, key) in faults(tmp_path, text)
 
 
-def test_own_files_are_told_from_others(tmp_path):
+@cases
+def test_own_files_are_told_from_others(tmp_path, text, ours):
     path = tmp_path / "f"
-    for text, ours in [
-        ("run,channel,time_s,state\n", True),
-        ("# remark\n Run , channel,time_s, state\n", True),
-        ("run,channel,time,state\n1,0,0.1,1\n", False),
-        ("time,voltage\n0,1\n", False),
-        ("", False),
-        (VERNIER, False),
-        ("0.1,1\n", False),
-    ]:
-        path.write_text(text)
-        assert is_own(read_lines(path)) is ours, text
+    path.write_text(text)
+    assert is_own(read_lines(path)) is ours
 
 
 SHAPES = st.sampled_from(["\t", ";", ","]), st.booleans(), st.integers(1, 4)
@@ -164,22 +131,7 @@ def test_stacked_runs_are_runs_of_their_own(tmp_path):
         assert [time for time, _ in told(two)] == [0.24, 0.26, 0.275]
 
 
-@pytest.mark.parametrize(
-    ("text", "code", "reason"),
-    [
-        ("t,x,y\n0.1,0,1\n0.14,0,2\n0.18,0,3\n0.22,0,4\n0.26,0,5\n", "regular_samples",
-         "samples at regular times"),
-        ("Time (s),colour,mood,taste,smell\n" + "".join(
-            f"0.{n}" + f",{n % 3}" * 4 + "\n" for n in range(9)),
-         "not_accepted", "'colour' is not a heading that is understood"),
-        ("Run,Time between gates (s)\n1,0.1\n2,0.1\n", "durations", "are durations"),
-        ("Time (s),Volt\n" + "".join(f"{n},{n % 2 * 1e-3 + n % 7 * 1e-3}\n" for n in range(40)),
-         "nothing_passes", "nothing passes"),
-        ("D0,D1\n0,1\n1,1\n0,1\n", "no_rate", "without a column of times"),
-        ("$timescale 3 moons $end\n", "no_rate", "without a $timescale of 1, 10 or 100 s to ps"),
-        ("PK\x03\x04\0\0", "not_text", "this is no text: a spreadsheet"),
-    ],
-)  # fmt: skip
+@cases
 def test_what_is_refused_is_refused_for_the_true_reason(tmp_path, text, code, reason):
     with pytest.raises(InputError) as caught:
         read(tmp_path, text)
@@ -188,48 +140,19 @@ def test_what_is_refused_is_refused_for_the_true_reason(tmp_path, text, code, re
     assert caught.value.hint
 
 
-FALL = (0.24, 0.29, 0.41, 0.44)
-
-
-def _row(times, separator=","):
-    return separator.join(f"{one:.9E}" for one in times)
-
-
-@pytest.mark.parametrize(
-    ("text", "passed"),
-    [
-        ('"Event time (s)","Interval (s)"\n' + "".join(f"{_row((t, 0.1))}\n" for t in FALL),
-         {"": FALL}),
-        ('"Start (s)"\t"Stop 1 (s)"\t"Stop 2 (s)"\t"Stop 3 (s)"\t"Stop 4 (s)"\n'
-         + _row(FALL, "\t") + "\tNaN\n", {"": FALL}),
-        ('"On 0 (s)";"Off 0 (s)";"On 1 (s)";"Off 1 (s)";"On 2 (s)";"Off 2 (s)"\n'
-         + _row((*FALL, 0, 0), ";").replace(".", ",") + "\n", {"": FALL}),
-        ("Trial,t1 (s),t2 (s),t3 (s),t4 (s)\n1,0.24,0.29,0.41,0.44\n2,0.25,0.3,0.42,0.45\n",
-         {"": (*FALL, 0.25, 0.3, 0.42, 0.45)}),
-        ("Time [s],Channel 0\n" + "".join(
-            f"2026-03-01T12:00:00.{ms:03}+00:00,{level}\n"
-            for ms, level in ((0, 1), (240, 0), (290, 1), (410, 0), (440, 1))
-        ), {"Channel 0": FALL}),
-    ],
-)  # fmt: skip
-def test_tables_of_telephones_and_of_several_gates_beside_each_other(tmp_path, text, passed):
+@cases
+def test_tables_of_telephones_and_of_several_gates_beside_each_other(tmp_path, text, label, times):
     path = tmp_path / "table.csv"
     path.write_text(text, "utf-8")
     file = read_file(TimerFile(path))
     changes, names = file.changes[~file.changes["first"]], [*file.names]
+    assert {names[one] for one in changes["label"]} == {label}
     ticks = changes["tick"].tolist()
-    origin = min(ticks) - round(FALL[0] * TICK_HZ)  # of a date it is far away
-    labels = [names[label] for label in changes["label"]]
-    states = [signals.STATES[state] for state in changes["state"]]
-    assert {*labels} == {*passed}
-    for label, times in passed.items():
-        own = [label == other for other in labels]
-        found = [(tick - origin) / TICK_HZ for tick in compress(ticks, own)]
-        assert found == pytest.approx(times)
-        said = [*compress(states, own)]
-        assert said in ([""] * len(times), ["blocked", "clear"] * (len(times) // 2)) or set(
-            said
-        ) == {"high", "low"}
+    origin = min(ticks) - round(times[0] * TICK_HZ)  # of a date it is far away
+    assert [(tick - origin) / TICK_HZ for tick in ticks] == pytest.approx(times)
+    said = [signals.STATES[state] for state in changes["state"]]
+    in_turn = ["blocked", "clear"] * (len(times) // 2)
+    assert said in ([""] * len(times), in_turn) or set(said) == {"high", "low"}
 
 
 @pytest.mark.parametrize("content", ["time (s),state\n0.1,1\n0.2,0\n0.3,1\n",

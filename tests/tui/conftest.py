@@ -1,14 +1,16 @@
 """A bench for each test."""
 
 import shutil
+import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from bench.process_fixture import ProcessFixture
 from tests.cli.conftest import finished  # noqa: F401 - a fixture
 from tests.cli.lab import short_fence
-from tests.tui.lab import Lab, short_folder, unseen
+from tests.tui.lab import Lab, unseen
 
 _FENCE = short_fence(3).replace("Free fall of a picket fence", "TITLE")
 
@@ -19,16 +21,22 @@ def _unseen(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def lab() -> Iterator[Lab]:
+def folder() -> Iterator[Path]:
+    """Make a folder with a name that a socket's address has room for."""
+    made = Path(tempfile.mkdtemp(prefix="rig-"))
+    yield made
+    shutil.rmtree(made, ignore_errors=True)  # a daemon may be ending in it
+
+
+@pytest.fixture
+def lab(folder: Path) -> Iterator[Lab]:
     """A quickly analysed scene before a daemon that runs."""
-    folder = short_folder()
     protocol = folder / "fence.yaml"
     protocol.write_text(_FENCE.replace("TITLE", "A short fence"), "utf-8")
     bench = Lab(folder, protocol)
     bench.start()
     yield bench
     bench.stop()
-    shutil.rmtree(folder)
 
 
 @pytest.fixture

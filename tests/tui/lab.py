@@ -6,7 +6,6 @@ import re
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager, suppress
@@ -205,11 +204,6 @@ def draw_without_pause(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have figures drawn as soon as their data are there, and looked at as soon."""
     for module in ("rig.tui.widgets.figure", "bench.pictures"):
         monkeypatch.setattr(f"{module}.PAUSE_S", 0.05)
-
-
-def short_folder() -> Path:
-    """Make a folder with a name that a socket's address has room for."""
-    return Path(tempfile.mkdtemp(prefix="rig-"))
 
 
 def text_of(app: App[object]) -> str:

@@ -1,7 +1,6 @@
 """From an empty folder to a first result, and back to what was recorded: by keys and by mouse."""
 
 import asyncio
-import shutil
 from pathlib import Path
 
 import pytest
@@ -19,13 +18,12 @@ from rig.tui.survey import session_list
 from rig.tui.widgets.text import Words
 from rig.wordings import NOTE
 from tests.cli.lab import short
-from tests.tui.lab import PATIENCE_S, at_screen, flat, short_folder
+from tests.tui.lab import PATIENCE_S, at_screen, flat
 
 KEYS_AT_MOST = 4
 
 
-async def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(monkeypatch):
-    folder = short_folder()
+async def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(folder, monkeypatch):
     (folder / "work").mkdir()
     monkeypatch.chdir(folder / "work")
     pressed = []
@@ -61,10 +59,11 @@ async def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(monkeyp
         assert trial.poll() is None
     assert trial.poll() is not None
     assert len(pressed) <= KEYS_AT_MOST
-    shutil.rmtree(folder)
 
 
-async def test_a_pico_that_waits_is_flashed_by_a_command_that_there_is(monkeypatch, tmp_path):
+async def test_a_pico_that_waits_is_flashed_by_a_command_that_there_is(
+    folder, monkeypatch, tmp_path
+):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("rig.tui.survey.waiting_drives", lambda: [tmp_path])
     asked = []
@@ -74,20 +73,17 @@ async def test_a_pico_that_waits_is_flashed_by_a_command_that_there_is(monkeypat
 
     monkeypatch.setattr(commands, "_run", record)
 
-    folder = short_folder()
     async with at_screen(Options(socket=folder / "rig.sock", still_s=0.0)) as op:
         await op.sees("Pico: put the firmware on it")
         await op.press("down", "down", "enter")
         await op.sees("Write the firmware?")
         await op.means()
         await op.until(lambda: asked)
-    shutil.rmtree(folder)
     assert asked == [("flash", "pico")]
 
 
-async def test_a_daemon_that_a_screen_started_ends_by_itself(monkeypatch):
+async def test_a_daemon_that_a_screen_started_ends_by_itself(folder, monkeypatch):
     monkeypatch.setattr(client, "_IDLE_S", 1.0)
-    folder = short_folder()
 
     there = asyncio.Event()
 
@@ -101,7 +97,6 @@ async def test_a_daemon_that_a_screen_started_ends_by_itself(monkeypatch):
     assert line.daemon.poll() is None
     assert await asyncio.to_thread(line.daemon.wait, PATIENCE_S) == 0
     assert "no client for 1 s" in (folder / "rig.log").read_text()
-    shutil.rmtree(folder)
 
 
 @pytest.fixture

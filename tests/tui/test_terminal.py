@@ -20,7 +20,6 @@ from rig.errors import RigError
 from rig.tui import terminal as keyboard
 from rig.tui.stillness import STILL_S
 from tests.cli.lab import ROOT, assert_whole, short
-from tests.tui.lab import short_folder
 from tests.waiting import PATIENCE_S, until
 
 _NEEDS_TMUX = pytest.mark.skipif(
@@ -98,14 +97,12 @@ class Terminal:
 
 
 @pytest.fixture
-def terminal() -> Iterator[Terminal]:
-    folder = short_folder()
+def terminal(folder: Path) -> Iterator[Terminal]:
     found = Terminal(folder)
     yield found
     with suppress(RigError):  # it may have ended with the test
         os.kill(_daemon_of(folder), signal.SIGTERM)
     subprocess.run(["tmux", "-S", str(found.socket), "kill-server"], check=False)
-    shutil.rmtree(folder, ignore_errors=True)
 
 
 @_NEEDS_TMUX
