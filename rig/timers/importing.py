@@ -273,8 +273,13 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
     """
     saved, labels, stated = Path(options.map_file or ""), file.labels or [""], dict[str, Any]()
     texts = {options.map_file: next(read_lines(saved), "")} if saved.is_file() else {}
-    named = {"--dark": ("dark", options.dark), "--unit": ("unit", options.unit)}
-    named |= {"--channel": (labels[0] or "input", options.channel)} if len(labels) < 2 else {}
+    named = {
+        "--dark": ("dark", options.dark),
+        "--unit": ("unit", options.unit),
+        "--channel": (labels[0] or "input", options.channel),
+    }
+    if options.channel is not None and len(labels) > 1:
+        raise refusal("--channel", "inputs_several", inputs=", ".join(labels))
     texts |= {place: f"{x}={value}" for place, (x, value) in named.items() if value is not None}
     texts |= {"--map": options.map} if options.map is not None else {}
     settings = {*SETTINGS}.difference(labels)
