@@ -250,10 +250,7 @@ def _pytest(
 
 
 def _tried(
-    mutants: list[Mutant],
-    reached: Reached,
-    copies: SimpleQueue[Path],
-    jobs: int,
+    mutants: list[Mutant], reached: Reached, copies: SimpleQueue[Path], jobs: int
 ) -> Iterator[Outcome]:
     def each(mutant: Mutant) -> Outcome:
         copy = copies.get()

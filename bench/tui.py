@@ -199,11 +199,7 @@ def _lateness(
             newer = next((when for when, count in sent if count > int(told)), at)
             late.append(max(0.0, at - newer))
     frames = len(late) / _LASTING_S
-    return {
-        "frames_per_s": frames,
-        "cpu_per_frame_s": share / frames,
-        "lag_s": spread(late),
-    }
+    return {"frames_per_s": frames, "cpu_per_frame_s": share / frames, "lag_s": spread(late)}
 
 
 def run(arguments: Namespace) -> Iterator[Findings]:

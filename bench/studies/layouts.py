@@ -120,10 +120,7 @@ def as_json(cells: Sequence[Cell]) -> dict[str, Any]:
         Cell("all", "", "", name, total(cell.score for cell in cells if cell.disturbance == name))
         for name in DISTURBANCES
     ]
-    return {
-        "layouts": [cell.json() for cell in cells],
-        "totals": [cell.json() for cell in totals],
-    }
+    return {"layouts": [cell.json() for cell in cells], "totals": [cell.json() for cell in totals]}
 
 
 def _lines(record: Record) -> Iterator[str]:

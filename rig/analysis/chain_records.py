@@ -262,11 +262,7 @@ def edge_train(
 
 @lru_cache(maxsize=256)  # a session needs the same few for every drop
 def _passages(
-    height: float,
-    chain: RodChain,
-    start: float,
-    higher: tuple[float, ...] | None,
-    darkening: bool,
+    height: float, chain: RodChain, start: float, higher: tuple[float, ...] | None, darkening: bool
 ) -> tuple[Index, Flags, Array]:
     """Return rods, polarities and levels of a beam's expected edges, as in `EdgeTrain`."""
     places = np.array(chain.chain.heights)

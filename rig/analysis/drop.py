@@ -200,12 +200,7 @@ class DropCase:
         return replace(reading, unlike=unlike), None if unlike else fit
 
     def _judge(
-        self,
-        reading: DropIdentity,
-        fit: Fit | None,
-        readings: Readings,
-        *,
-        explain: bool,
+        self, reading: DropIdentity, fit: Fit | None, readings: Readings, *, explain: bool
     ) -> tuple[DropResult, Fit | None]:
         """Return the drop's result and its fit, if that is good enough for values."""
         protocol, run, drop, records = self.protocol, self.run, self.drop, self.records

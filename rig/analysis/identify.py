@@ -204,10 +204,7 @@ def well_read(fit: Fit) -> bool:
 def possible(record: ChainRecord) -> int:
     """Return how many edges of a side are matchable by gate and polarity alone."""
     return sum(
-        min(
-            int(np.count_nonzero(train.blocked == dark)),
-            int(np.count_nonzero(train.blocks == dark)),
-        )
+        int(min(np.count_nonzero(train.blocked == dark), np.count_nonzero(train.blocks == dark)))
         for train in record.trains
         for dark in (True, False)
     )

@@ -212,11 +212,7 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
 
 
 def _move(
-    groups: Sequence[DropGroup],
-    reduced: Sequence[Elimination],
-    x: Array,
-    sd: Array,
-    step: Array,
+    groups: Sequence[DropGroup], reduced: Sequence[Elimination], x: Array, sd: Array, step: Array
 ) -> tuple[Array, list[DropGroup], list[Residuals]] | None:
     """Take a step, shortened until all residuals are finite.
 

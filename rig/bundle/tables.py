@@ -45,10 +45,7 @@ def _meanings() -> dict[str, str]:
 
 
 def csv_files(
-    session: Reader,
-    analysis: Mapping[str, Any],
-    clock: Calibration,
-    leave_out: Container[str] = (),
+    session: Reader, analysis: Mapping[str, Any], clock: Calibration, leave_out: Container[str] = ()
 ) -> dict[str, str]:
     """Make ``runs``, ``summary``, ``budget``, ``edges``, ``states`` and ``pings.csv``, a README.
 

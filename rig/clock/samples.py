@@ -60,9 +60,7 @@ class HostTime:
 
 
 def one_axis(
-    pings: Samples,
-    boots_ns: Sequence[int] = (),
-    breaks: Sequence[HostBreak] = (),
+    pings: Samples, boots_ns: Sequence[int] = (), breaks: Sequence[HostBreak] = ()
 ) -> HostTime:
     """Put samples on one axis where the host's clock began again or stood still in between.
 

@@ -20,14 +20,7 @@ from typing import Any, NamedTuple
 
 from rig.daemon.lease import Lease
 from rig.daemon.rpc import error_to_data, in_words
-from rig.errors import (
-    ControlError,
-    DeviceError,
-    InputError,
-    RigError,
-    SessionError,
-    StoppedError,
-)
+from rig.errors import ControlError, DeviceError, InputError, RigError, SessionError, StoppedError
 from rig.link.refusals import DeviceRefusedError
 from rig.ports import is_simulated
 from rig.reasons import Reason, make_reason, remedies, rig_error

@@ -19,13 +19,7 @@ import numpy as np
 from rig.analysis.annealing import MISSED
 from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import priors
-from rig.analysis.identify import (
-    LEAD,
-    Identification,
-    deciding_gate,
-    identify,
-    pattern_faults,
-)
+from rig.analysis.identify import LEAD, Identification, deciding_gate, identify, pattern_faults
 from rig.design.cases import CLOCK_U, perfect, predict_drop, with_edges
 from rig.protocol.contact import of_run
 from rig.protocol.plan import runs

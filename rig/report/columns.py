@@ -119,13 +119,7 @@ def _kinds(each: str) -> list[Measurand]:
     return [row for row in MEASURANDS.values() if getattr(row, each.removeprefix("each "))]
 
 
-def _cell(
-    place: str,
-    way: str,
-    row: Measurand | None,
-    derived: Derived,
-    record: Any,
-) -> str:
+def _cell(place: str, way: str, row: Measurand | None, derived: Derived, record: Any) -> str:
     own = record.get if isinstance(record, Mapping) else partial(getattr, record)
     row = row or own("row", None) or MEASURANDS.get(own("quantity", ""))
     value = value_at(record, place.format(row=row), derived)

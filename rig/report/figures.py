@@ -34,9 +34,7 @@ _SMALL = 6.0
 
 
 def result_figure(
-    analysis: Analysis,
-    curves: Mapping[str, Any],
-    bars: Bars = "U95",
+    analysis: Analysis, curves: Mapping[str, Any], bars: Bars = "U95"
 ) -> Chart | None:
     """Return the figure of results against incline, or by run for few inclines or other settings.
 

@@ -135,10 +135,7 @@ def calibration(session: Reader) -> Calibration:
 
 
 def results(
-    session: Reader,
-    progress: Progress | None = None,
-    *,
-    fresh: bool = False,
+    session: Reader, progress: Progress | None = None, *, fresh: bool = False
 ) -> SessionResults:
     """Return the results of a session, from the cache or by a new analysis.
 

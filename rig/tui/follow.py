@@ -61,9 +61,7 @@ class Follower:
     """
 
     def __init__(
-        self,
-        client: ReconnectingClient,
-        begin: Callable[[Coroutine[Any, Any, None]], object],
+        self, client: ReconnectingClient, begin: Callable[[Coroutine[Any, Any, None]], object]
     ) -> None:
         self.state = DaemonState()
         self.indicators = Indicators()

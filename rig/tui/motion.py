@@ -82,9 +82,7 @@ class ChainFall:
 
 
 def motions(
-    protocol: Protocol,
-    run: Run,
-    recorded: tuple[Drop, float | Fraction, DropResult] | None = None,
+    protocol: Protocol, run: Run, recorded: tuple[Drop, float | Fraction, DropResult] | None = None
 ) -> tuple[ChainFall, ...]:
     """Return the falls of a run's chains, measured and by the model.
 

@@ -63,11 +63,7 @@ class Drawing(NamedTuple):
 
 
 def drawing(
-    protocol: Protocol,
-    run: Run,
-    falls: Sequence[ChainFall],
-    indicators: Indicators,
-    time_s: float,
+    protocol: Protocol, run: Run, falls: Sequence[ChainFall], indicators: Indicators, time_s: float
 ) -> Drawing:
     """Return the measured chains over those of the model, between the posts of their gates.
 

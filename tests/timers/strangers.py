@@ -109,10 +109,7 @@ def strangers() -> dict[str, Shape]:
         "min,sec,gate,state\n"
         + table([int((t + 59.5) // 60), f"{(t + 59.5) % 60:.6f}", c, int(d)] for t, c, d in one),
     )
-    put(
-        "A state without a name",
-        "Time (s),State 0,State 1,,State 3\n0.000000,0,0,0,0\n" + LEVELS,
-    )
+    put("A state without a name", "Time (s),State 0,State 1,,State 3\n0.000000,0,0,0,0\n" + LEVELS)
     time, channel, dark = one[3]
     bounce = [(time + 2e-6, channel, not dark), (time + 4e-6, channel, dark)]
     bouncing = [[*one[:4], *bounce, *one[4:]]]
@@ -152,10 +149,7 @@ def strangers() -> dict[str, Shape]:
         table([f"{t:.6f}", *levels(one, t)[1:]] for t in (0, *(t for t, _, _ in late))),
         [late],
     )
-    put(
-        "More names than columns",
-        "gate,blocked (s),clear (s),foo\n" + passings,
-    )
+    put("More names than columns", "gate,blocked (s),clear (s),foo\n" + passings)
     put(
         "A row for each gate that is passed",
         "n,start (s),end (s)\n"

@@ -58,10 +58,7 @@ def test_what_people_and_programs_write(tmp_path: Path) -> None:
     head = "\ufeff# from my timer\r\n\r\n Run , channel,time_s, state\r\n"
     text = head + '1, 2 ,-0.25,"1"\r\n#\r\n 1,2, .5 ,0'
     [drop] = read(tmp_path, text)
-    assert drop.edges == (
-        Edge(750_000_000_000, 2, True),
-        Edge(1_500_000_000_000, 2, False),
-    )
+    assert drop.edges == (Edge(750_000_000_000, 2, True), Edge(1_500_000_000_000, 2, False))
     assert drop.initial_state == 0
 
 
