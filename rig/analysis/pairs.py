@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import groupby
-from operator import attrgetter
+from itertools import product
 
 import numpy as np
 
@@ -72,12 +71,9 @@ def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects,
     order = [first, second, second, first]
     good = {result.run: result for result in good_runs(results)}
     signs = np.array([1.0, -1.0, -1.0, 1.0])  # first chain less second, for each run of a block
-    places, every = [*protocol.settings], []
-    planned = sorted(
-        planned_runs(protocol), key=lambda run: (run.incline_deg, places.index(run.setting))
-    )
-    for (incline, setting), group in groupby(planned, attrgetter("incline_deg", "setting")):
-        runs = [*group]
+    planned, every = planned_runs(protocol), []
+    for incline, setting in product(sorted({*protocol.plan.inclines}), protocol.settings):
+        runs = [run for run in planned if (run.incline_deg, run.setting) == (incline, setting)]
         fours = zip(*(runs[place::4] for place in range(4)), strict=False)
         blocks = [
             [good[run] for run in four]

@@ -48,9 +48,7 @@ def vary(root: Node, faults: Faults) -> Iterator[str]:
             wanted = "a list of unlike values"
         else:
             entry = ScalarNode(name, plain=True, place=key.place)
-            choices.append(
-                [(section.entries, entry, f"{_text(key)} {_text(item)}", item) for item in items]
-            )
+            choices.append([(section.entries, entry, key, item) for item in items])
             continue
         faults.add(key.place, "plan.vary", f"found {key}: {values}; accepted: {wanted}")
     if math.prod(map(len, choices)) > MOST:
@@ -60,7 +58,7 @@ def vary(root: Node, faults: Faults) -> Iterator[str]:
     for number, setting in enumerate(product(*choices)):
         for entries, entry, _, value in setting:
             entries[:] = [*(pair for pair in entries if pair[0] is not entry), (entry, value)]
-        words = ", ".join(words for _, _, words, _ in setting)
+        words = ", ".join(f"{_text(key)} {_text(value)}" for _, _, key, value in setting)
         # What is wrong in the first setting is so in all.
         faults.setting = f" ({words})" if number else ""
         yield one_line(words, len(words))
