@@ -8,28 +8,23 @@ from __future__ import annotations
 
 import itertools
 import re
-import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from rig.text_rows import read_rows
 from rig.timers import vocabulary
 from rig.timers.table import Row, RowBlock
+from rig.timers.timer_file import TimerFile
 from rig.timers.vocabulary import POWERS, find_label, form, is_number, normal, unit_of, words
-
-if TYPE_CHECKING:
-    from rig.timers.timer_file import TimerFile
 
 SAMPLED = ("level", "volts")
 """Roles of samples: what an input was at a time, whether it changed then or not."""
 VALUES = (SAMPLED, ("state", "cleared"), ("edge",))
 """Roles that say what happened; of a table that has several, the first are read."""
 _MOST_COLUMNS = 200
-_NOWHERE = sys.maxsize
-"""Of a column that there is not."""
 _FORMS = "whole", "bit", "count", "fraction", "stamp"
 """Kinds of cells, beside those that `rig.timers.vocabulary.kinds_of` knows."""
 _NO_ROLES = {"high", "low", "one", "zero", "unknown", "missing", "gate letter"}
@@ -284,7 +279,7 @@ def pair_columns(columns: Sequence[TimerColumn]) -> list[Signal]:
         own = [column for column in columns if _clock_of(column, times) is clock]
         values = [column for column in own if column.role in chosen]
         if not values and not is_sampled:
-            values = [replace(clock, at=_NOWHERE, role="moment")]
+            values = [replace(clock, at=ROW_COUNT.at, role="moment")]
         labels = Counter(map(_label_of, values))
         for n, value in enumerate(values, 1):
             is_beside = is_sampled or len(values) > 1

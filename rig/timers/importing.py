@@ -22,7 +22,8 @@ from rig.timers.layouts import SETTINGS, FileReading, find_layouts, input_names
 from rig.timers.lines import read_lines
 from rig.timers.moments import LONGEST_DROP, TICK_HZ
 from rig.timers.problems import refusal
-from rig.timers.timer_file import TimerFile, read_file
+from rig.timers.signals import read_file
+from rig.timers.timer_file import TimerFile
 from rig.timers.vocabulary import POWERS, form
 
 Fit = Callable[[FileReading, bool], "FallMatch"]

@@ -18,8 +18,7 @@ from rig.arrays import Index
 from rig.records import Drop
 from rig.timers.edge_rows import make_drop
 from rig.timers.moments import TICK_HZ
-from rig.timers.signals import STATES, Changes
-from rig.timers.timer_file import TimerFile
+from rig.timers.timer_file import STATES, Changes, TimerFile
 from rig.timers.vocabulary import POWERS, number_of
 
 _LONGEST = 60 * TICK_HZ

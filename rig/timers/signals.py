@@ -1,7 +1,8 @@
 """Rows of a table as changes: what each column says at a time, and when that changes.
 
-A column of volts, of levels or of states, and a column of times alone, are all the same thing: at a
-time, an input had a value.
+Loggers of photogates (tables of times, or of times and states), boards that print pin, edge and
+time, logic analysers (a column an input, or value change dumps) and oscilloscopes (volts) are all
+the same thing: at a time, an input had a value.
 """
 
 from __future__ import annotations
@@ -9,42 +10,67 @@ from __future__ import annotations
 import itertools
 from array import array
 from collections.abc import Iterator
+from contextlib import closing
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, TypeAlias
+from operator import attrgetter
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.reasons import make_reason
 from rig.timers.columns import SAMPLED, TimerColumn, columns_of, pair_columns, roles
 from rig.timers.crossings import find_crossings, find_threshold
+from rig.timers.lines import is_cut, read_lines
 from rig.timers.moments import OVERFLOWS_PS, TICK_HZ, moment
-from rig.timers.table import Row
+from rig.timers.table import Row, RowBlock, Table
+from rig.timers.timer_file import CHANGE, STATES, Changes, TimerFile
+from rig.timers.vcd import BEGINNINGS, vcd_rows
 from rig.timers.vocabulary import is_number, state_of
-
-if TYPE_CHECKING:
-    from rig.timers.timer_file import TimerFile
 
 MAX_EVENTS = 500_000
 """Those of 600 drops of 25 rods past 16 gates; what has more is no record of drops."""
+_SAMPLE = 200
+"""Rows that show what columns are."""
+_MARKS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", " ": "blanks", "": "words"}
 _TURN = 600 * TICK_HZ
 """Picoseconds from a time to the next within which a counter is taken to have begun anew."""
-STATES = ("", "clear", "blocked", "low", "high")
-"""What begins with a change, of a beam or of a signal; nothing where the file does not say."""
 _REJECTED = len(STATES)
 """What a cell says that is not accepted; one that says nothing is 0."""
-CHANGE = np.dtype(
-    {
-        "names": ["line", "tick", "rank", "state", "label", "run", "clock", "block", "first"],
-        "formats": ["i4", "O", "i4", "i1", "i4", "i4", "i4", "i4", "?"],
-    }
-)
-"""A change at an input: its line; its time, ps (of a date it needs more than 64 bits), and how many
-times are before it; which of `STATES` begins; what the file calls the input and the run (places in
-`TimerFile.names`); which column of times it is of, where several are alike; the block of rows; and
-whether it is a first row, which may say the state at the beginning."""
-Changes: TypeAlias = NDArray[Any]
-"""Rows of `CHANGE`."""
+
+
+def read_file(file: TimerFile) -> TimerFile:
+    """Find out what a file says, in the way in which its columns are to be understood.
+
+    Raises
+    ------
+    InputError
+        Every fault of the file at its line and column, or what it is instead.
+    """
+    with closing(read_lines(file.path)) as lines:
+        head = list(itertools.islice(lines, 50))
+        numbered = enumerate(itertools.chain(head, lines), 1)
+        is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
+        table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered)
+        file.lines.append(f"a table, its cells separated by {_MARKS[table.separator]}")
+        readers: dict[object, SignalReader] = {}
+        changes = [file.changes]
+        for block, group in itertools.groupby(table.rows(), attrgetter("block")):
+            rows = iter(group)
+            sample = list(itertools.islice(rows, _SAMPLE))
+            if block.key not in readers:
+                readers[block.key] = SignalReader(file, block, sample)
+            changes.append(readers[block.key].read(block, itertools.chain(sample, rows)))
+    file.problems.raise_if_any()
+    file.changes = np.concatenate(changes)
+    file.changes = file.changes[np.argsort(file.changes["line"], kind="stable")]
+    _, file.changes["rank"] = np.unique(file.changes["tick"], return_inverse=True)
+    file.rows += len(table.strays)
+    file.unread += [row.line for row in table.strays]
+    if not len(file.changes):
+        notes = "".join(f"; {note}" for note in file.notes)
+        file.problems.refuse(1, 1, "nothing_passes" if file.rows else "no_edges", notes=notes)
+    file.notes += [make_reason("last_line_cut")] if is_cut(file.path) else []
+    return file
 
 
 class SignalReader:
@@ -64,15 +90,18 @@ class SignalReader:
         otherwise each state is.
     """
 
-    def __init__(self, file: TimerFile, sample: list[Row]) -> None:
-        columns = columns_of(file, sample[0].block, sample)
+    def __init__(self, file: TimerFile, block: RowBlock, sample: list[Row]) -> None:
+        columns = columns_of(file, block, sample)
         self.file, self.signals = file, pair_columns(columns)
         self.clocks = list(dict.fromkeys(signal.clock for signal in self.signals))
+        base = (0.0, 1.0) if self.clocks[0].role == "time" else block.find_time_base()
+        if base is None:
+            file.problems.refuse(sample[0].line, 1, "no_rate", lacks="a column of times or a rate")
+        self.base = base
         used = {column.role for column in columns}
-        values = [signal.value.at for signal in self.signals if signal.value.role != "moment"]
         filled = {x.at: sum(row.cell(x.at) != "" for row in sample) for x in columns}
-        total = sum(filled[at] for at in values)
-        is_filled = len(values) == 1 or 2 * total >= (len(values) + 1) * len(sample)
+        values = [filled[at] for _, value, *_ in self.signals if (at := value.at) in filled]
+        is_filled = len(values) == 1 or 2 * sum(values) >= (len(values) + 1) * len(sample)
         named = [x for x in columns[::-1] if x.role in {"run", "gate"} and "volts" not in used]
         self.places = {x.role: x.at for x in named}
         self.above = {x: "" for x, at in self.places.items() if 2 * filled[at] <= len(sample)}
@@ -89,29 +118,16 @@ class SignalReader:
         file.is_guess |= bool(self.above)
         file.has_runs |= "run" in self.places
 
-    def read(self, rows: Iterator[Row]) -> list[Changes]:
-        """Return the changes that rows say; a row may say that nothing changes, or be unread.
-
-        Rows of samples without times are at a stated rate.
-        """
-        file, first = self.file, next(rows)
-        base = (0.0, 1.0) if self.clocks[0].role == "time" else first.block.find_time_base()
-        if base is None:
-            file.problems.refuse(first.line, 1, "no_rate", lacks="a column of times or a rate")
-        self.base, self.count = base, 0
+    def read(self, block: RowBlock, rows: Iterator[Row]) -> Changes:
+        """Return the changes that rows say; a row may say that nothing changes, or be unread."""
+        file, self.block, self.count = self.file, block, 0
         self.starts, self.latest = dict[int, int](), dict[int, int]()
-        self.values, self.keys = dict[int, tuple[int, ...]](), set[tuple[int, ...]]()
+        self.states, self.keys = dict[int, tuple[int, int, int]](), set[tuple[int, int, int]]()
         self.changes, self.samples = list[Any](), [array("d") for _ in self.signals]
-        for row in itertools.chain([first], rows):
+        for row in rows:
             ticks = {clock.at: self._read_time(row, clock) for clock in self.clocks}
-            is_read = False
-            for n, signal in enumerate(self.signals):
-                word, tick = row.cell(signal.value.at), ticks[signal.clock.at]
-                is_said = word or self.is_sampled or signal.value.role == "moment"
-                if tick is not None and is_said:
-                    self._read_value(n, row, word, tick)
-                    is_read = True
-            file.unread += [] if is_read else [row.line]
+            said = [self._read_value(n, row, ticks[x.clock.at]) for n, x in enumerate(self.signals)]
+            file.unread += [] if any(said) else [row.line]
             self.count += 1
             if len(self.changes) > MAX_EVENTS:
                 file.problems.refuse(row.line, 1, "too_many_events", limit=MAX_EVENTS)
@@ -119,17 +135,22 @@ class SignalReader:
         if self.unused and not self.places and self.signals[0].value.role == "moment":
             steps = [b[1] - a[1] for a, b in itertools.pairwise(self.changes)]
             if len(steps) > 3 and max(steps) < 1.5 * min(steps):
-                file.problems.refuse(first.line, 1, "regular_samples", columns=self.unused)
-        volts = [n for n, signal in enumerate(self.signals) if signal.value.role == "volts"]
-        parts = [np.array(self.changes, CHANGE), *map(self._find_crossings, volts)]
-        silent = self.count - len({line for part in parts for line in part["line"].tolist()})
+                line = self.changes[0][0]
+                file.problems.refuse(line, 1, "regular_samples", columns=self.unused)
+        for n, signal in enumerate(self.signals):
+            if signal.value.role == "volts":
+                self.changes += self._find_crossings(n, row)
+        silent = self.count - len({change[0] for change in self.changes})
         if self.is_sampled and 2 * silent > self.count:
-            lasting = max(self.latest.values()) - min(self.starts.values())
+            lasting = max(self.latest.values(), default=0) - min(self.starts.values(), default=0)
             file.period = lasting // max(1, self.count - 1)
-        return parts
+        return np.array(self.changes, CHANGE)
 
     def _read_time(self, row: Row, clock: TimerColumn) -> int | None:
-        """Return the time of a row, ps; `None` where it says nothing."""
+        """Return the time of a row, ps; `None` where it says nothing.
+
+        Rows of samples without times are at a stated rate.
+        """
         text = row.cell(clock.at) if clock.at >= 0 else str(self.count)
         tick = moment(text, clock.power or 0)
         if tick is None:
@@ -148,57 +169,59 @@ class SignalReader:
         self.latest[clock.at] = tick
         return tick
 
-    def _read_value(self, n: int, row: Row, word: str, tick: int) -> None:
+    def _read_value(self, n: int, row: Row, tick: int | None) -> bool:
         """Keep what a cell says: a sample of volts, or a state if that is a change."""
-        signal, names, block = self.signals[n], self.file.names, row.block
-        value = signal.value
-        if value.role == "volts" and is_number(word):
-            offset = tick - self.starts[signal.clock.at]
-            self.samples[n].extend((row.line, offset, float(word)))
-            return
+        signal, value = self.signals[n], self.signals[n].value
+        word = row.cell(value.at)
+        if tick is None or not (word or self.is_sampled or value.role == "moment"):
+            return False
         state = code_of(value.role, value.words.get(word, word) or value.state)
-        if state == _REJECTED:
+        if value.role == "volts" and is_number(word):
+            self.samples[n].extend((row.line, tick - self.starts[signal.clock.at], float(word)))
+        elif state == _REJECTED:
             self._reject(row, value, word)
         elif state or not self.is_sampled:
-            name = self._read_name(row, "run") or signal.run or block.run
-            run = names.setdefault(name, len(names))
-            before, self.values[n] = self.values.get(n), (state, run)
-            if self.is_whole and before == self.values[n]:
-                return
-            label = self._read_name(row, "gate") or signal.label or block.gate
-            key = n, run, names.setdefault(label, len(names))
-            # A first row may be the state at the beginning of a run, and no change.
-            is_first = self.is_whole and key not in self.keys
-            self.keys.add(key)
-            at = signal.clock.at
-            self.changes.append(
-                (row.line, tick, 0, state, key[-1], run, at, block.number, is_first)
-            )
+            names = self._names_of(n, row)
+            before, self.states[n] = self.states.get(n), (state, *names)
+            if not self.is_whole or before != self.states[n]:
+                # A first row may be the state at the beginning of a run, and no change.
+                is_first = self.is_whole and (n, *names) not in self.keys
+                self.keys.add((n, *names))
+                self.changes.append(self._change(n, row.line, tick, self.states[n], is_first))
+        return True
 
-    def _read_name(self, row: Row, role: str) -> str:
-        """Return what a row says of its run or gate; of merged cells only the first has a text."""
-        text = row.cell(self.places[role]) if role in self.places else ""
-        if role in self.above:
-            text = self.above[role] = text or self.above[role]
-        return text
+    def _names_of(self, n: int, row: Row) -> tuple[int, int]:
+        """Return what the run and the input are called: in the row, its heading or a mark above."""
+        signal, block = self.signals[n], self.block
+        names = {"run": signal.run or block.run, "gate": signal.label or block.gate}
+        for role, at in self.places.items():
+            text = row.cell(at)
+            if role in self.above:  # of merged cells only the first has a text
+                text = self.above[role] = text or self.above[role]
+            names[role] = text or names[role]
+        return self.file.place_of(names["run"]), self.file.place_of(names["gate"])
 
-    def _find_crossings(self, n: int) -> Changes:
-        """Return where volts cross the middle; note how many do, or that nothing passes."""
-        label, start = self.signals[n].label, self.starts.get(self.signals[n].clock.at, 0)
+    def _change(
+        self, n: int, line: int, tick: int, state: tuple[int, int, int], is_first: bool = False
+    ) -> tuple[object, ...]:
+        return line, tick, *state, self.signals[n].clock.at, self.block.number, is_first, 0
+
+    def _find_crossings(self, n: int, row: Row) -> Iterator[tuple[object, ...]]:
+        """Yield where volts cross the middle; note how many do, or that nothing passes."""
+        signal, notes = self.signals[n], self.file.notes
         samples = np.array(self.samples[n]).reshape(-1, 3)
         volts = samples[:, 2]
         if (threshold := find_threshold(volts)) is None:
             limits = {"low": min(volts, default=0), "high": max(volts, default=0)}
-            self.file.notes.append(make_reason("no_passage", input=label, **limits))
-            return np.empty(0, CHANGE)
-        lines, offsets, is_high = find_crossings(samples, threshold).T
-        counts = {"crossings": len(lines), "level": threshold[0]}
-        self.file.notes.append(make_reason("crossings", input=label, **counts))
-        changes = np.zeros(len(lines), CHANGE)
-        changes["line"], changes["state"] = lines, STATES.index("low") + is_high
-        changes["tick"] = [start + round(offset) for offset in offsets.tolist()]
-        changes["label"] = self.file.names.setdefault(label, len(self.file.names))
-        return changes
+            notes.append(make_reason("no_passage", input=signal.label, **limits))
+            return
+        crossings = find_crossings(samples, threshold).tolist()
+        counts = {"crossings": len(crossings), "level": threshold[0]}
+        notes.append(make_reason("crossings", input=signal.label, **counts))
+        start, names = self.starts[signal.clock.at], self._names_of(n, row)
+        for line, offset, is_high in crossings:
+            state = STATES.index("high" if is_high else "low")
+            yield self._change(n, int(line), start + round(offset), (state, *names))
 
     def _reject(self, row: Row, column: TimerColumn, text: str) -> None:
         """Note a cell whose value is not accepted."""

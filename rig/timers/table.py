@@ -129,8 +129,8 @@ class Row(NamedTuple):
     block: RowBlock = RowBlock()
 
     def cell(self, at: int) -> str:
-        """Return what a column, from 0, has; nothing where the row ends before it."""
-        return self.texts[at] if at < len(self.texts) else ""
+        """Return what a column, from 0, has; nothing where the row has no such."""
+        return self.texts[at] if 0 <= at < len(self.texts) else ""
 
     @property
     def known(self) -> int:

@@ -1,32 +1,36 @@
-"""A timer's file: its changes, and what it leaves open.
+"""What was understood of a timer's file: its changes, and what it leaves open.
 
-Loggers of photogates (tables of times, or of times and states), boards that print pin, edge and
-time, logic analysers (a column an input, or value change dumps) and oscilloscopes (volts). What a
-file does not say (which gate, which level is dark, which unit) is left to `rig.timers.layouts`.
+What a file does not say (which gate, which level is dark, which unit) is left to
+`rig.timers.layouts`.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import dataclass, field
-from operator import attrgetter
 from pathlib import Path
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.reasons import Reason, make_reason
-from rig.timers.lines import is_cut, read_lines
 from rig.timers.problems import ProblemList
-from rig.timers.signals import CHANGE, Changes, SignalReader
-from rig.timers.table import Row, Table
-from rig.timers.vcd import BEGINNINGS, vcd_rows
 from rig.timers.vocabulary import number_of
 
-_SAMPLE = 200
-"""Rows that show what columns are."""
-_MARKS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", " ": "blanks", "": "words"}
+STATES = ("", "clear", "blocked", "low", "high")
+"""What begins with a change, of a beam or of a signal; nothing where the file does not say."""
+CHANGE = np.dtype(
+    {
+        "names": ["line", "tick", "state", "run", "label", "clock", "block", "first", "rank"],
+        "formats": ["i4", "O", "i1", "i4", "i4", "i4", "i4", "?", "i4"],
+    }
+)
+"""A change at an input: its line; its time, ps (of a date it needs more than 64 bits); which of
+`STATES` begins; what the file calls the run and the input (places in `TimerFile.names`); which
+column of times it is of, where several are alike; the block of rows; whether it is a first row,
+which may say the state at the beginning; and how many times are before it."""
+Changes: TypeAlias = NDArray[Any]
+"""Rows of `CHANGE`."""
 
 
 @dataclass(eq=False, slots=True)
@@ -101,45 +105,6 @@ class TimerFile:
         labels = [names[label] for label in np.unique(changes["label"]) if label]
         return sorted(labels, key=lambda label: (number_of(label) or 0, label))
 
-
-def read_file(file: TimerFile) -> TimerFile:
-    """Find out what a file says, in the way in which its columns are to be understood.
-
-    Raises
-    ------
-    InputError
-        Every fault of the file at its line and column, or what it is instead.
-    """
-    with closing(read_lines(file.path)) as lines:
-        head = list(itertools.islice(lines, 50))
-        numbered = enumerate(itertools.chain(head, lines), 1)
-        is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
-        table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered)
-        file.lines.append(f"a table, its cells separated by {_MARKS[table.separator]}")
-        readers: dict[object, SignalReader] = {}
-        changes = [file.changes]
-        for _, rows in itertools.groupby(table.rows(), attrgetter("block.key")):
-            changes += _read_rows(file, rows, readers)
-            file.problems.raise_if_any()
-    file.changes = np.concatenate(changes)
-    file.changes = file.changes[np.argsort(file.changes["line"], kind="stable")]
-    _, file.changes["rank"] = np.unique(file.changes["tick"], return_inverse=True)
-    file.rows += len(table.strays)
-    file.unread += [row.line for row in table.strays]
-    if not len(file.changes):
-        notes = "".join(f"; {note}" for note in file.notes)
-        file.problems.refuse(1, 1, "nothing_passes" if file.rows else "no_edges", notes=notes)
-    file.notes += [make_reason("last_line_cut")] if is_cut(file.path) else []
-    return file
-
-
-def _read_rows(
-    file: TimerFile, rows: Iterator[Row], readers: dict[object, SignalReader]
-) -> Iterator[Changes]:
-    """Yield what rows say whose columns are the same, and those of earlier ones with their key."""
-    sample = list(itertools.islice(rows, _SAMPLE))
-    block = sample[0].block
-    if block.key not in readers:
-        readers[block.key] = SignalReader(file, [row for row in sample if row.block is block])
-    for _, capture in itertools.groupby(itertools.chain(sample, rows), attrgetter("block.number")):
-        yield from readers[block.key].read(capture)
+    def place_of(self, name: str) -> int:
+        """Return the place of a name, which is new or known."""
+        return self.names.setdefault(name, len(self.names))

@@ -69,9 +69,5 @@ def read_video(path: str | Path) -> VideoTrack:
 
 def _find_axes(row: Row) -> dict[str, tuple[int, str]]:
     """Return where t, x and y stand in a heading, the first of each, and their units."""
-    axes: dict[str, tuple[int, str]] = {}
-    for n, text in enumerate(row.texts):
-        if name := form("axis").match(text):
-            unit = form("axis unit").search(text)
-            axes.setdefault(name[1].lower(), (n, unit[1] if unit else ""))
-    return axes
+    axes = [(n, form("axis").match(text)) for n, text in enumerate(row.texts)]
+    return {axis[1].lower(): (n, axis[2] or "") for n, axis in reversed(axes) if axis}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 import unicodedata
 from functools import cache, lru_cache
@@ -82,11 +83,9 @@ def unit_of(heading: str) -> str:
     """
     text = normal(heading)
     units = form("bracketed unit").findall(text)
-    for word in (*units, *form("last word").findall(text)):
-        for unit in (*POWERS, "v"):
-            if word in words()[f"unit {unit}"]:
-                return unit
-    return units[-1] if units else ""
+    possible = itertools.product((*units, *form("last word").findall(text)), (*POWERS, "v"))
+    known = (unit for word, unit in possible if word in words()[f"unit {unit}"])
+    return next(known, units[-1] if units else "")
 
 
 @lru_cache(1000)

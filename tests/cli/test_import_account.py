@@ -6,7 +6,7 @@ from contextlib import suppress
 import pytest
 
 from rig.errors import InputError
-from rig.timers.timer_file import TimerFile, read_file
+from rig.timers import signals, timer_file
 from tests.cli.lab import PROTOCOLS
 from tests.tables import cases
 from tests.timers.shapes import RUNS, shapes
@@ -123,5 +123,5 @@ def test_a_hostile_file_is_read_or_refused_at_once(tmp_path, content):
     path.write_text(content, "utf-8")
     start = time.process_time()
     with suppress(InputError):
-        read_file(TimerFile(path))
+        signals.read_file(timer_file.TimerFile(path))
     assert time.process_time() - start < 1.0

@@ -17,7 +17,7 @@ from rig.timers.edge_rows import is_own
 from rig.timers.layouts import FileReading, find_layouts
 from rig.timers.lines import read_lines
 from rig.timers.moments import TICK_HZ
-from rig.timers.timer_file import TimerFile, read_file
+from rig.timers.timer_file import TimerFile
 from tests.examples import examples
 from tests.tables import cases
 from tests.timers.test_edges_csv import faults_of
@@ -29,17 +29,16 @@ VERNIER = (
 )
 
 
-def drops_of(file, channels: dict[str, int], bars: int, dark: str | None = None) -> list[Drop]:
+def drops_of(file, channels: dict[str, int], bars: int) -> list[Drop]:
     """Read a file in the most usual way, its inputs being as given."""
-    stated = {"channels": channels} | ({"dark": dark} if dark else {})
-    layout = next(find_layouts(file, list(channels.values()), bars, stated))
+    layout = next(find_layouts(file, list(channels.values()), bars, {"channels": channels}))
     return FileReading(file, layout).drops
 
 
 def read(tmp_path: Path, content: str | bytes, bars: int = 8) -> list[Drop]:
     path = tmp_path / "export.txt"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return drops_of(read_file(TimerFile(path)), {"": 3}, bars)
+    return drops_of(signals.read_file(TimerFile(path)), {"": 3}, bars)
 
 
 def told(drop: Drop) -> list[tuple[float, bool]]:
@@ -144,7 +143,7 @@ def test_what_is_refused_is_refused_for_the_true_reason(tmp_path, text, code, re
 def test_tables_of_telephones_and_of_several_gates_beside_each_other(tmp_path, text, label, times):
     path = tmp_path / "table.csv"
     path.write_text(text, "utf-8")
-    file = read_file(TimerFile(path))
+    file = signals.read_file(TimerFile(path))
     changes, names = file.changes[~file.changes["first"]], [*file.names]
     assert {names[one] for one in changes["label"]} == {label}
     ticks = changes["tick"].tolist()
@@ -171,7 +170,7 @@ def test_of_a_dump_only_changes_of_unlisted_wires_are_refused(tmp_path):
         "$var real 64 0 volts $end\n$enddefinitions $end\n$comment\n100\n$end\n"
     )
     path.write_text(f"{head}#0 0! b0101 1a\nr1.5 0\n#400 1!\n#500 0!\n", "utf-8")
-    assert len(read_file(TimerFile(path)).changes) == 3
+    assert len(signals.read_file(TimerFile(path)).changes) == 3
     assert faults(tmp_path, f"{head}#0 0!\n#400 1!\n#500 0!\n1a\n") == [(12, 1, "wire")]
 
 
@@ -185,5 +184,5 @@ def test_a_line_longer_than_any_text_s_is_refused_at_its_place(tmp_path):
 def test_a_number_that_may_be_cut_off_is_said(tmp_path, end, is_said):
     path = tmp_path / "export.txt"
     path.write_text(f"Time (s)\n0.251234\n0.262345\n0.473456\n{end}", "utf-8")
-    notes = {note.code for note in read_file(TimerFile(path)).notes}
+    notes = {note.code for note in signals.read_file(TimerFile(path)).notes}
     assert ("last_line_cut" in notes) is is_said
