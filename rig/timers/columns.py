@@ -24,9 +24,7 @@ SAMPLED = ("level", "volts")
 """Roles of samples: what an input was at a time, whether it changed then or not."""
 VALUES = (SAMPLED, ("state", "cleared"), ("edge",))
 """Roles that say what happened; of a table that has several, the first are read."""
-_MOST_COLUMNS = 200
-_FORMS = "whole", "bit", "count", "fraction", "stamp"
-"""Kinds of cells, beside those that `rig.timers.vocabulary.kinds_of` knows."""
+_WIDEST = 200
 _NO_ROLES = {"high", "low", "one", "zero", "unknown", "missing", "gate letter"}
 """Of words that say nothing of a column: those of cells, and letters without a number."""
 _MOST_OPEN = 3
@@ -117,9 +115,8 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
         Columns of which none has times, or that are called as a setting is.
     """
     width = max(len(row.texts) for row in rows)
-    if width > _MOST_COLUMNS:
-        limits = {"columns": width, "limit": _MOST_COLUMNS}
-        file.problems.refuse(rows[0].line, 1, "too_many_columns", **limits)
+    if width > _WIDEST:
+        file.problems.refuse(rows[0].line, 1, "too_many_columns", columns=width, limit=_WIDEST)
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
     facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
     heading = block.find_heading(width)
@@ -129,7 +126,7 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     shared = {f"table.{fact}" for fact in set().union(*facts.values())}
     states = sum("all.state" in fact for fact in facts.values())
     shared |= {f"columns.{min(len(facts), _MANY)}", f"states.{min(states, _MANY)}"}
-    shared |= {"rated"} if block.find_time_base() else set()
+    shared |= _held({"rated": block.find_time_base()})
     columns = [_read_column(block, heading, n, facts[n] | shared, cells[n]) for n in facts]
     if heading is None:
         for row in block.headings:
@@ -159,8 +156,8 @@ def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
     """
     there = {column.role for column in columns}
     meant = {"elapsed": "duration" if "time" in there else "time"}
-    meant |= {"level": "state"} if "state" in there else {}  # the same, without a name
-    meant |= {"level": "volts"} if "volts" in there else {}  # those that are 0 at first
+    # Levels beside states are the same without a name; beside volts, volts that are 0 at first.
+    meant["level"] = next((role for role in ("volts", "state") if role in there), "level")
     unclear = [column for column in columns if "|" in column.role]
     readings = [column.role.split("|") for column in unclear]
     ways = [
@@ -190,23 +187,21 @@ def _read_column(
     last = (row.cell(n) for row in block.headings[-1:] if heading and row.line > heading.line)
     units = list(map(unit_of, (bare, *last, *cells[: "all.timed" in facts])))
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
+    unit = "" if find_label(unit, "gate") else unit
     is_numbers = form("row of numbers").fullmatch
     numbers = (row.cell(n) for row in block.headings if is_numbers(row.raw))
     column.gate = _heading_label(block, heading, n, "gate") or next(numbers, "")
     roles_of_name = vocabulary.roles_in(bare)
     named = {
         "time": unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"],
-        "timed": unit in POWERS,
-        "volt": unit == "v",
-        "unitless": not unit,
-        "strange": unit not in {*POWERS, "v", ""} and not find_label(unit, "gate"),
         "bare": not (roles_of_name - _NO_ROLES or unit or column.gate or column.run),
         "named": name,
         "first": not n,
         "labelled": column.gate,
         "numbered": column.run,
     }
-    facts |= roles_of_name | _held(named)
+    kind = "timed" if unit in POWERS else {"v": "volt", "": "unitless"}.get(unit, "strange")
+    facts |= roles_of_name | _held(named) | {kind}
     column.role = next(
         role
         for role, rule in read_rows(__file__, "columns.txt", ":")
@@ -238,10 +233,7 @@ def _heading_label(block: RowBlock, heading: Row | None, n: int, role: str) -> s
 
 def _facts_of_values(texts: Sequence[str]) -> set[str]:
     """Return what holds of the values of a column, of which some may be missing."""
-    kinds = [
-        vocabulary.kinds_of(text) | {kind for kind in _FORMS if form(kind).fullmatch(text)}
-        for text in texts
-    ]
+    kinds = list(map(vocabulary.kinds_of, texts))
     facts = {f"all.{kind}" for kind in frozenset.intersection(*kinds)}
     facts |= {f"any.{kind}" for kind in frozenset().union(*kinds)}
     numbers = [float(text) for text in texts if is_number(text)]

@@ -104,14 +104,13 @@ def edges_text(drops: Iterable[Drop], hz: Callable[[Drop], float]) -> str:
     ValueError
         If two drops are of the same run.
     """
-    rows, seen = [",".join(HEADER) + "\n"], set[int]()
+    rows = {0: ",".join(HEADER) + "\n"}
     for drop in drops:
-        if drop.run in seen:
+        if drop.run in rows:
             raise ValueError(f"two drops of run {drop.run}")
-        seen.add(drop.run)
         rate = Fraction(hz(drop))
-        rows += [
+        rows[drop.run] = "".join(
             f"{drop.run},{edge.channel},{seconds(edge.tick, rate)},{int(edge.blocked)}\n"
             for edge in drop.edges
-        ]
-    return "".join(rows)
+        )
+    return "".join(rows.values())

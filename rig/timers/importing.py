@@ -28,10 +28,6 @@ from rig.timers.vocabulary import POWERS, form
 
 Fit = Callable[[FileReading, bool], "FallMatch"]
 
-_GOOD = 0.75
-"""Share of the edges near a fall's, of all that came or were due, that makes a reading credible."""
-_GOOD_GUESS = 0.95
-"""The same where falls decide which columns are used."""
 _DECISIVE = 7.0
 """Logarithm of the odds beyond which a reading is taken without a question: 1,000 to 1."""
 _FINALISTS = 6
@@ -114,12 +110,12 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
             if getattr(options, name) is not None:
                 raise refusal(f"--{name.replace('_', '-')}", "own_format_stated")
         return Import(read_edges(place), {}, [f"the project's own format: {','.join(HEADER)}"], [])
-    readings, stated = _find_readings(options, gates, bars)
+    readings = _find_readings(options, gates, bars)
     reading, match = readings[0], FallMatch(0.0)
     if not options.as_read:
         readings = [reading for reading in readings if reading.is_whole] or readings
-        reading, match = _choose(readings, place, fit, stated)
-        _refuse_impossible(reading, place, is_stated="groups" in stated)
+        reading, match = _choose(readings, place, fit)
+        _refuse_impossible(reading, place)
     notes = [*reading.file.notes, _account(reading, options)]
     if not options.as_read:
         notes.append(make_reason("reading_chosen", option=str(reading.layout), fit=match.text))
@@ -132,17 +128,15 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
     return Import(reading.drops, channels, lines, notes)
 
 
-def _find_readings(
-    options: Namespace, gates: Sequence[int], bars: int
-) -> tuple[list[FileReading], dict[str, Any]]:
-    """Return every reading of a file that has drops, and what options decide."""
-    readings, faults, stated = list[FileReading](), list[InputError](), dict[str, Any]()
+def _find_readings(options: Namespace, gates: Sequence[int], bars: int) -> list[FileReading]:
+    """Return every reading of a file that has drops."""
+    readings, faults = list[FileReading](), list[InputError]()
     for way in itertools.count():
         file = TimerFile(options.events, way)
         try:
             read_file(file)
-            stated = _read_stated(options, file, gates)
-            possible = [FileReading(file, x) for x in find_layouts(file, gates, bars, stated)]
+            file.stated = _read_stated(options, file, gates)
+            possible = [FileReading(file, layout) for layout in find_layouts(file, gates, bars)]
             readings += [reading for reading in possible if reading.runs]
         except InputError as error:
             faults.append(error)
@@ -151,20 +145,19 @@ def _find_readings(
     if not readings:
         if faults:
             raise faults[0]
-        pairs = ",".join(f"{name}={n}" for name, n in zip(file.labels, gates, strict=False))
-        values = {"inputs": ", ".join(file.labels), "channels": ", ".join(map(str, gates))}
+        labels = file.labels or ["input"]
+        pairs = ",".join(f"{name}={n}" for name, n in zip(labels, gates, strict=False))
+        values = {"inputs": ", ".join(labels), "channels": ", ".join(map(str, gates))}
         raise refusal(options.events, "inputs_unclear", **values, pairs=pairs)
     shortest = min(readings, key=lambda reading: max(reading.lasting))
     if max(shortest.lasting) > LONGEST_DROP:
         limit = {"lasting_s": max(shortest.lasting) / TICK_HZ, "limit_s": LONGEST_DROP / TICK_HZ}
         place = f"{options.events}:{shortest.line[shortest.tick.argmax()]}:1"
         raise refusal(place, "too_long", recording="a drop", **limit)
-    return [reading for reading in readings if max(reading.lasting) <= LONGEST_DROP], stated
+    return [reading for reading in readings if max(reading.lasting) <= LONGEST_DROP]
 
 
-def _choose(
-    readings: Sequence[FileReading], place: str, fit: Fit, stated: Mapping[str, Any]
-) -> tuple[FileReading, FallMatch]:
+def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[FileReading, FallMatch]:
     """Return the reading that a fall of the protocol bears out, and how well.
 
     Where the user said which input is which gate, that reading, if there is no other, is taken
@@ -172,14 +165,14 @@ def _choose(
     taken.
     """
     distinct = [*{x.key: x for x in reversed(readings)}.values()][::-1]
-    if len(distinct) == 1 and "channels" in stated:
+    if len(distinct) == 1 and "channels" in distinct[0].file.stated:
         return distinct[0], fit(distinct[0], True)
-    good = _GOOD_GUESS if any(x.file.is_guess or x.file.ways > 1 for x in distinct) else _GOOD
     rough = sorted(((fit(x, False), x) for x in distinct), key=lambda row: -row[0].share)
-    likely = [x for match, x in rough if match.share >= good]
+    likely = [x for match, x in rough if match.share >= x.least_share]
     exact = [(fit(x, True), x) for x in likely[:_FINALISTS]]
-    contrary = "" if "dark" in stated else "inverted"
-    ranked = [row for row in exact if row[0].share >= good and row[1].layout.dark != contrary]
+    ranked = [row for row in exact if row[0].share >= row[1].least_share]
+    if "dark" not in distinct[0].file.stated:
+        ranked = [row for row in ranked if row[1].layout.dark != "inverted"]
     # The first row of a log of changes is the state at the beginning, unless falls say that.
     ranked.sort(key=lambda row: _DECISIVE * (row[1].layout.first == "change") - row[0].evidence)
     if not ranked:
@@ -198,14 +191,14 @@ def _choose(
     return reading, match
 
 
-def _refuse_impossible(reading: FileReading, place: str, *, is_stated: bool) -> None:
+def _refuse_impossible(reading: FileReading, place: str) -> None:
     """Refuse what no drop does: the same again, or two changes at once.
 
     An input that has a name is no wire of all gates, unless the user stated so.
     """
     file, layout, drops = reading.file, reading.layout, reading.drops
     is_wire = layout.groups == "passing" and not file.is_wide and bool(file.labels)
-    if is_wire and not is_stated:
+    if is_wire and "groups" not in file.stated:
         raise refusal(place, "one_wire", option=str(layout))
     earlier: dict[object, int] = {}
     for drop in drops:
@@ -274,14 +267,11 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
     """
     saved, labels, stated = Path(options.map_file or ""), file.labels or [""], dict[str, Any]()
     texts = {options.map_file: next(read_lines(saved), "")} if saved.is_file() else {}
-    named = {
-        "--dark": ("dark", options.dark),
-        "--unit": ("unit", options.unit),
-        "--channel": (labels[0] or "input", options.channel),
-    }
+    named = {"dark": options.dark, "unit": options.unit, "channel": options.channel}
+    called = {"channel": labels[0] or "input"}
     if options.channel is not None and len(labels) > 1:
         raise refusal("--channel", "inputs_several", inputs=", ".join(labels))
-    texts |= {place: f"{x}={value}" for place, (x, value) in named.items() if value is not None}
+    texts |= {f"--{x}": f"{called.get(x, x)}={y}" for x, y in named.items() if y is not None}
     texts |= {"--map": options.map} if options.map is not None else {}
     settings = {*SETTINGS}.difference(labels)
     for place, text in texts.items():

@@ -24,7 +24,13 @@ from rig.timers.vocabulary import POWERS, number_of
 _LONGEST = 60 * TICK_HZ
 """Picoseconds: a drop lasts half a second, and nobody waits a minute until it is recorded."""
 _CLEAR_PAUSE = 3.0
+_GOOD = 0.75
+"""Share of the edges that makes a reading credible."""
+_GOOD_GUESS = 0.95
+"""The same where falls decide which columns, or which gates, rows are of."""
 _MOST_MAPS = 200
+_FEWEST = 3
+"""Changes of a drop that tell which gate it passed: two are near those of falls past several."""
 
 SETTINGS = ("unit", "dark", "groups", "first", "pause_s")
 """What a layout has beside its inputs; `forms.txt` says what each may be."""
@@ -44,8 +50,9 @@ class FileLayout:
         beam darkens and clears in turns, clears first (``turns-clear``), or darkens at ``each``.
     groups
         Whether parts of the file are ``runs``, and parted where times begin anew; or such parts
-        have times in any order (``unsorted``); or runs are its ``rows``, or its ``columns`` of
-        times; or in each run all gates stand in the order of the way (``passing``).
+        have times in any order (``unsorted``); or runs are its ``columns`` of times; or in each run
+        all gates stand in the order of the way (``passing``). Runs that are its ``rows``, though
+        their times do not begin anew, have to be stated.
     first
         Whether the first row of a log of changes is the ``state`` at the beginning or a ``change``.
     pause_s
@@ -78,22 +85,26 @@ class FileReading:
 
     Attributes
     ----------
+    least_share
+        Of the edges near a fall's, of all that came or were due, for it to be credible.
     runs
         Their numbers, in order.
     places
         Where the edges of each run begin, and where those of the last end.
     firsts
         Inputs whose first row is a beam that is blocked, at the beginning or by a change.
-    line, tick, channel, blocked
-        Of each edge: the line that it comes from, its time, ps, its gate, and the state after it.
     dropped
         Lines of changes at inputs that are no gate.
+    line, tick, channel, blocked
+        Of each edge: the line that it comes from, its time, ps, its gate, and the state after it.
     renamed
         Runs that the file calls otherwise: its name, and the number here.
     """
 
     def __init__(self, file: TimerFile, layout: FileLayout) -> None:
         self.file, self.layout = file, layout
+        is_guess = file.is_guess or file.ways > 1 or layout.groups == "passing"
+        self.least_share = _GOOD_GUESS if is_guess else _GOOD
         grouping = layout.unit, layout.groups, layout.pause_s
         changes, drop, numbers = group_changes(file, *grouping)
         label, channels = changes["label"], [layout.channels.get(name, -1) for name in file.names]
@@ -168,7 +179,7 @@ class FileReading:
 
 @lru_cache(4)
 def group_changes(
-    file: TimerFile, unit: str, groups: str, pause_s: float
+    file: TimerFile, unit: str, groups: str, pause: float
 ) -> tuple[Changes, Index, Index]:
     """Return changes by drops and times, which drop each is of, and what numbers drops have, or 0.
 
@@ -188,8 +199,8 @@ def group_changes(
     is_other = np.any(np.diff(same, prepend=-1) != 0, axis=0)
     changes, drops = changes[order][is_other], drop[is_other].astype(np.intp) - 1
     changes["tick"] //= 10 ** POWERS[unit or "s"]
-    if pause_s:
-        is_late = np.diff(changes["tick"], prepend=0) >= round(pause_s * TICK_HZ)
+    if pause:
+        is_late = np.diff(changes["tick"], prepend=0) >= round(pause * TICK_HZ)
         drops += np.cumsum(is_late & (np.diff(drops, prepend=-1) == 0))
     _, starts = np.unique(drops, return_index=True)
     named = np.array([-1 if (n := number_of(x)) is None else n for x in file.names])
@@ -214,20 +225,17 @@ def input_names(file: TimerFile, groups: str | None, gates: Sequence[int]) -> li
     return passing if groups == "passing" else [*file.labels] or [""]
 
 
-def find_layouts(
-    file: TimerFile, gates: Sequence[int], bars: int, stated: Mapping[str, Any]
-) -> Iterator[FileLayout]:
+def find_layouts(file: TimerFile, gates: Sequence[int], bars: int) -> Iterator[FileLayout]:
     """Yield every way in which a file may be read, that which is most usual first.
 
     Parameters
     ----------
     gates
         Channels, in the order in which the gates are passed.
-    stated
-        What is decided: attributes of `FileLayout`.
     """
+    stated = file.stated
     state, is_wire = file.changes["state"], len(file.labels) < 2 and bars == 1 < len(gates)
-    groups = ["runs", *["unsorted"] * file.is_stacked, *["rows", "columns"] * file.is_wide]
+    groups = ["runs", *["unsorted"] * file.is_stacked, *["columns"] * file.is_wide]
     groups += ["passing"] * is_wire
     changes, drop, _ = group_changes(file, "", groups[0], 0.0)
     most = 1 + count_before(drop * len(file.names) + changes["label"]).max(initial=0)
@@ -276,6 +284,9 @@ def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list
     by_number = {x: n for x in labels if (n := number_of(x)) is not None and n in gates}
     if len(set(by_number.values())) == len(labels):
         return [by_number]
+    _, drop, _ = group_changes(file, layout.unit, layout.groups, 0.0)
+    if labels == [""] and len(gates) > 1 and np.all(np.bincount(drop) < _FEWEST):
+        return []
     later = file.changes[~file.changes["first"]][::-1]
     first = dict(zip(later["label"].tolist(), later["tick"], strict=True))
     passed = sorted(labels, key=lambda label: first.get(file.names[label], 0))

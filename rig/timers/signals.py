@@ -8,6 +8,7 @@ the same thing: at a time, an input had a value.
 from __future__ import annotations
 
 import itertools
+import re
 from array import array
 from collections.abc import Iterator
 from contextlib import closing
@@ -101,7 +102,7 @@ class SignalReader:
         used = {column.role for column in columns}
         filled = {x.at: sum(row.cell(x.at) != "" for row in sample) for x in columns}
         values = [filled[at] for _, value, *_ in self.signals if (at := value.at) in filled]
-        is_filled = len(values) == 1 or 2 * sum(values) >= (len(values) + 1) * len(sample)
+        is_filled = 2 * sum(values) > len(values) * len(sample)
         named = [x for x in columns[::-1] if x.role in {"run", "gate"} and "volts" not in used]
         self.places = {x.role: x.at for x in named}
         self.above = {x: "" for x, at in self.places.items() if 2 * filled[at] <= len(sample)}
@@ -114,7 +115,8 @@ class SignalReader:
         file.lines += [f"  {column.name}: {column.meaning}" for column in columns]
         file.is_sampled |= self.is_sampled
         is_named = any(clock.run for clock in self.clocks)
-        file.is_wide |= len(self.clocks) > 1 and not (self.is_sampled or is_named)
+        called = {re.sub("[0-9]+", "", clock.name) for clock in self.clocks}
+        file.is_wide |= len(self.clocks) > len(called) == 1 and not (self.is_sampled or is_named)
         file.is_guess |= bool(self.above)
         file.has_runs |= "run" in self.places
 
@@ -122,7 +124,7 @@ class SignalReader:
         """Return the changes that rows say; a row may say that nothing changes, or be unread."""
         file, self.block, self.count = self.file, block, 0
         self.starts, self.latest = dict[int, int](), dict[int, int]()
-        self.states, self.keys = dict[int, tuple[int, int, int]](), set[tuple[int, int, int]]()
+        self.states = dict[tuple[int, int, int], int]()
         self.changes, self.samples = list[Any](), [array("d") for _ in self.signals]
         for row in rows:
             ticks = {clock.at: self._read_time(row, clock) for clock in self.clocks}
@@ -139,7 +141,7 @@ class SignalReader:
                 file.problems.refuse(line, 1, "regular_samples", columns=self.unused)
         for n, signal in enumerate(self.signals):
             if signal.value.role == "volts":
-                self.changes += self._find_crossings(n, row)
+                self._find_crossings(n, row)
         silent = self.count - len({change[0] for change in self.changes})
         if self.is_sampled and 2 * silent > self.count:
             lasting = max(self.latest.values(), default=0) - min(self.starts.values(), default=0)
@@ -153,9 +155,9 @@ class SignalReader:
         """
         text = row.cell(clock.at) if clock.at >= 0 else str(self.count)
         tick = moment(text, clock.power or 0)
+        if tick is None and text:
+            self._reject(row, clock, text)
         if tick is None:
-            if text:
-                self._reject(row, clock, text)
             return None
         if clock.role != "time":
             tick = round(self.base[0] * TICK_HZ + self.base[1] * tick)
@@ -182,12 +184,12 @@ class SignalReader:
             self._reject(row, value, word)
         elif state or not self.is_sampled:
             names = self._names_of(n, row)
-            before, self.states[n] = self.states.get(n), (state, *names)
-            if not self.is_whole or before != self.states[n]:
+            before = self.states.get((n, *names))
+            self.states[n, *names] = state
+            if not self.is_whole or before != state:
                 # A first row may be the state at the beginning of a run, and no change.
-                is_first = self.is_whole and (n, *names) not in self.keys
-                self.keys.add((n, *names))
-                self.changes.append(self._change(n, row.line, tick, self.states[n], is_first))
+                is_first = self.is_whole and before is None
+                self._keep(n, names, is_first, row.line, tick, state)
         return True
 
     def _names_of(self, n: int, row: Row) -> tuple[int, int]:
@@ -201,13 +203,12 @@ class SignalReader:
             names[role] = text or names[role]
         return self.file.place_of(names["run"]), self.file.place_of(names["gate"])
 
-    def _change(
-        self, n: int, line: int, tick: int, state: tuple[int, int, int], is_first: bool = False
-    ) -> tuple[object, ...]:
-        return line, tick, *state, self.signals[n].clock.at, self.block.number, is_first, 0
+    def _keep(self, n: int, names: tuple[int, int], is_first: bool, *change: int) -> None:
+        clock, number = self.signals[n].clock.at, self.block.number
+        self.changes.append((*change, *names, clock, number, is_first, 0))
 
-    def _find_crossings(self, n: int, row: Row) -> Iterator[tuple[object, ...]]:
-        """Yield where volts cross the middle; note how many do, or that nothing passes."""
+    def _find_crossings(self, n: int, row: Row) -> None:
+        """Keep where volts cross the middle; note how many do, or that nothing passes."""
         signal, notes = self.signals[n], self.file.notes
         samples = np.array(self.samples[n]).reshape(-1, 3)
         volts = samples[:, 2]
@@ -221,7 +222,7 @@ class SignalReader:
         start, names = self.starts[signal.clock.at], self._names_of(n, row)
         for line, offset, is_high in crossings:
             state = STATES.index("high" if is_high else "low")
-            yield self._change(n, int(line), start + round(offset), (state, *names))
+            self._keep(n, names, False, int(line), start + round(offset), state)
 
     def _reject(self, row: Row, column: TimerColumn, text: str) -> None:
         """Note a cell whose value is not accepted."""

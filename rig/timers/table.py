@@ -229,8 +229,7 @@ class Table:
         """Return the block below a mark; a run or gate goes on until a mark names another."""
         run, gate = vocabulary.find_label(mark, "run"), vocabulary.find_label(mark, "gate")
         number = last.number + (not run and not gate)
-        above = last.headings if last.width else [*last.above, *last.headings]
-        above = above[:_SAMPLE]
+        above = (last.headings if last.width else [*last.above, *last.headings])[:_SAMPLE]
         return RowBlock(self.remarks, above, number, run or last.run, gate or last.gate)
 
     def _begins_block(self, row: Row) -> bool:

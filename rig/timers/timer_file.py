@@ -19,12 +19,8 @@ from rig.timers.vocabulary import number_of
 
 STATES = ("", "clear", "blocked", "low", "high")
 """What begins with a change, of a beam or of a signal; nothing where the file does not say."""
-CHANGE = np.dtype(
-    {
-        "names": ["line", "tick", "state", "run", "label", "clock", "block", "first", "rank"],
-        "formats": ["i4", "O", "i1", "i4", "i4", "i4", "i4", "?", "i4"],
-    }
-)
+_FIELDS = "line:i4 tick:O state:i1 run:i4 label:i4 clock:i4 block:i4 first:? rank:i4"
+CHANGE = np.dtype([tuple(name.split(":")) for name in _FIELDS.split()])
 """A change at an input: its line; its time, ps (of a date it needs more than 64 bits); which of
 `STATES` begins; what the file calls the run and the input (places in `TimerFile.names`); which
 column of times it is of, where several are alike; the block of rows; whether it is a first row,
@@ -57,7 +53,7 @@ class TimerFile:
     is_sampled
         Whether it has samples: a level that changes may be of an input that is no gate.
     is_wide
-        Whether a row has several times, so that it may be a run.
+        Whether a row has several times that are called alike, so that each may be of a run.
     is_guess
         Whether rows lack the name of their run or gate, so that falls decide.
     has_runs
@@ -68,6 +64,8 @@ class TimerFile:
         Those that neither change anything nor say that nothing changes.
     notes
         What is to be said, a reason each.
+    stated
+        What options decide: attributes of `rig.timers.layouts.FileLayout`.
     problems
         Its faults.
     """
@@ -87,6 +85,7 @@ class TimerFile:
     rows: int = 0
     unread: list[int] = field(default_factory=list)
     notes: list[Reason] = field(default_factory=list)
+    stated: dict[str, Any] = field(default_factory=dict)
     problems: ProblemList = field(init=False)
 
     def __post_init__(self) -> None:

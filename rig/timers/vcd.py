@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 
 from rig.timers.problems import ProblemList
 from rig.timers.vocabulary import POWERS, form
 
 BEGINNINGS = ("$date", "$version", "$timescale", "$comment", "$scope", "$var")
-_LONGEST_HEAD = 1_000_000
-"""Characters, before which the wires have to be listed."""
+_LONGEST_HEAD = 5000
+"""Lines, before which the wires have to be listed."""
 
 
 def vcd_rows(lines: Iterator[tuple[int, str]], problems: ProblemList) -> Iterator[tuple[int, str]]:
     """Yield a heading, and a line of all levels for each time at which a level may change."""
-    head = ""
-    for _, line in lines:
-        head += line[:200] + " "
-        if "$enddefinitions" in line or len(head) > _LONGEST_HEAD:
-            break
+    above = itertools.takewhile(lambda pair: "$enddefinitions" not in pair[1], lines)
+    head = " ".join(line[:200] for _, line in itertools.islice(above, _LONGEST_HEAD))
     scale, names = form("time scale").search(head), dict(form("wire").findall(head))
     if scale is None or not names:
         lacks = "a $timescale of 1, 10 or 100 s to ps, or without a wire of one bit"

@@ -15,7 +15,8 @@ SYMBOLS = {0: "s", 3: "ms", 6: "µs", 9: "ns", None: "an unknown unit"}
 LONGEST = 200
 """Characters: no cell, and no line of named values, is longer."""
 
-
+_KINDS = "number", "comma number", "clock", "timed", "input"
+_DETAILS = "whole", "bit", "count", "fraction", "stamp"
 _FAMILIES = {"blocked": "beam", "clear": "beam", "high": "signal", "low": "signal"}
 """Of what a state is; of others than these the file does not say."""
 
@@ -123,14 +124,17 @@ def kinds_of(text: str) -> frozenset[str]:
     frozenset of str
         ``number`` (with a decimal point) or ``comma number``; ``clock``, a time of day, perhaps
         with its date; ``timed``, a time with its unit; ``input``, a name with its number;
-        ``state``, with what `state_of` says, and ``beam``, ``signal`` or ``level``: of what it is.
+        ``state``, with what `state_of` says, and ``beam``, ``signal`` or ``level``: of what it is;
+        and how it is written, a form of `forms.txt`.
     """
-    state, forms = state_of(text), ("number", "comma number", "clock", "timed", "input")
-    kinds = {kind for kind in forms if form(kind).fullmatch(text[: LONGEST + 1])}
-    if len(text) > LONGEST or ("input" in kinds and "start" in roles_in(text)):
+    if len(text) > LONGEST:
         return frozenset()
-    family = _FAMILIES.get(state, "level")
-    return frozenset(kinds | ({"state", state, family} if state else set()))
+    state = state_of(text)
+    kinds = {kind for kind in _KINDS if form(kind).fullmatch(text)}
+    kinds |= {"state", state, _FAMILIES.get(state, "level")} if state else set()
+    if not kinds or ("input" in kinds and "start" in roles_in(text)):
+        return frozenset()
+    return frozenset(kinds | {detail for detail in _DETAILS if form(detail).fullmatch(text)})
 
 
 def is_remark(line: str) -> bool:

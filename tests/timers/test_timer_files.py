@@ -31,7 +31,8 @@ VERNIER = (
 
 def drops_of(file, channels: dict[str, int], bars: int) -> list[Drop]:
     """Read a file in the most usual way, its inputs being as given."""
-    layout = next(find_layouts(file, list(channels.values()), bars, {"channels": channels}))
+    file.stated["channels"] = channels
+    layout = next(find_layouts(file, list(channels.values()), bars))
     return FileReading(file, layout).drops
 
 
