@@ -18,7 +18,7 @@ from rig_emulator.wiring import BOARDS, Wiring
 from sim.dials import read_dials
 from sim.lab import ChainLab
 from tests.firmware.toolchain import FIRMWARE, make
-from tests.link.bench import ScriptedLab, VirtualBench
+from tests.link.bench import Bench, ScriptedLab
 from tests.link.conformance import DeviceConformance
 
 _TURN_TICKS = 1 << 16
@@ -28,7 +28,7 @@ def image_for(wiring: Wiring) -> Path:
     return make(f"build/{wiring.mcu}/firmware.elf")
 
 
-class AvrBench(VirtualBench):
+class AvrBench(Bench):
     serial_type = EmulatedSerial
     touch_s = 1e-3
     tick_tolerance = 5  # an edge waits for the instruction that it interrupts

@@ -5,12 +5,12 @@ import pytest
 from rig.link import messages as wire
 from rig.link.client import Device
 from tests.firmware.core_board import BROWN_OUT, CoreBoard
-from tests.link.bench import LABEL, ScriptedLab, VirtualBench, falling_rods
+from tests.link.bench import LABEL, Bench, ScriptedLab, falling_rods
 from tests.link.conformance import DeviceConformance
 from tests.link.talk import Wire, arm
 
 
-class CoreBench(VirtualBench):
+class CoreBench(Bench):
     tick_tolerance = 2
     touch_s = 1e-3
 

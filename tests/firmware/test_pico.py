@@ -15,7 +15,7 @@ from rig_emulator.protocol_emu import EmulatedSerial
 from rig_emulator.wiring import PICO
 from tests.firmware.pico import build, symbol
 from tests.firmware.toolchain import FIRMWARE
-from tests.link.bench import LABEL, ScriptedLab, VirtualBench, falling_rods
+from tests.link.bench import LABEL, Bench, ScriptedLab, falling_rods
 from tests.link.conformance import DeviceConformance
 from tests.link.talk import arm, connected
 from tests.tables import cases
@@ -25,7 +25,7 @@ CYCLES = 6 * HZ
 FENCE = FIRMWARE.parent / "protocols" / "picket-fence.yaml"
 
 
-class PicoBench(VirtualBench):
+class PicoBench(Bench):
     serial_type = EmulatedSerial
     touch_s = 1e-3  # nothing shorter than 50 ns is seen
     brown_out_cause = 1  # the chip cannot tell it from power

@@ -33,18 +33,6 @@ class Suite:
         return device.transcript.identity
 
     @pytest.fixture
-    def watched(self, bench) -> Bench:
-        if not bench.can_see_outputs:
-            pytest.skip("the release outputs cannot be watched here")
-        return bench
-
-    @pytest.fixture
-    def stoppable(self, bench) -> Bench:
-        if not bench.can_stop:
-            pytest.skip("there is no hand at the emergency stop here")
-        return bench
-
-    @pytest.fixture
     def sensing(self, bench) -> Bench:
         if not bench.can_sense:
             pytest.skip("the release-sense input cannot be driven here")

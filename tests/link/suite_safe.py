@@ -11,52 +11,52 @@ from tests.link.talk import Wire, arm
 LONG = {"pulse_us": 100_000, "record_ms": 150}
 
 
-def later(watched, seconds: float) -> int:
+def later(bench, seconds: float) -> int:
     """Let time pass, and return which releases are on."""
-    watched.clock().sleep(seconds)
-    return watched.outputs()
+    bench.clock().sleep(seconds)
+    return bench.outputs()
 
 
 class OutputSuite(Suite):
-    def test_outputs_are_on_for_the_pulse_and_no_longer(self, watched, device, identity):
-        seen = [watched.outputs()]
+    def test_outputs_are_on_for_the_pulse_and_no_longer(self, bench, device, identity):
+        seen = [bench.outputs()]
         token = arm(device, **LONG)
-        seen.append(watched.outputs())
+        seen.append(bench.outputs())
         self.refused(wire.RefusalReason.WRONG_TOKEN, device.fire, token ^ 1)
-        seen.append(watched.outputs())
+        seen.append(bench.outputs())
         device.fire(token)
-        seen.append(watched.outputs())
-        seen.append(later(watched, 0.08))
-        seen.append(later(watched, 0.04))
+        seen.append(bench.outputs())
+        seen.append(later(bench, 0.08))
+        seen.append(later(bench, 0.04))
         drop = device.collect(LABEL)
-        seen.append(watched.outputs())
+        seen.append(bench.outputs())
         assert seen == [0, 0, 0, 1, 1, 0, 0]
-        self.close(watched, identity, drop.certificate.pulse_ticks, 0.1)
+        self.close(bench, identity, drop.certificate.pulse_ticks, 0.1)
         assert drop.certificate.restarts == 0
 
-    def test_all_releases_of_a_drop_go_together(self, watched, device, identity):
+    def test_all_releases_of_a_drop_go_together(self, bench, device, identity):
         if identity.releases < 2:
             pytest.skip("this board has one release")
         device.fire(arm(device, release=0b11, **LONG))
-        assert watched.outputs() == 0b11
-        assert later(watched, 0.12) == 0
+        assert bench.outputs() == 0b11
+        assert later(bench, 0.12) == 0
 
-    def test_a_drop_without_release_switches_nothing(self, watched, device, identity):
+    def test_a_drop_without_release_switches_nothing(self, bench, device, identity):
         device.fire(arm(device, release=0, pulse_us=0))
-        assert watched.outputs() == 0
+        assert bench.outputs() == 0
         drop = device.collect(LABEL)
         assert drop.certificate.pulse_ticks == 0
-        self.check(watched, drop, identity)
+        self.check(bench, drop, identity)
 
-    def test_nothing_is_on_outside_of_a_recording(self, watched, device):
+    def test_nothing_is_on_outside_of_a_recording(self, bench, device):
         device.fire(arm(device, pulse_us=80_000, record_ms=40))
-        assert later(watched, 0.03) == 1
-        assert later(watched, 0.02) == 0
+        assert later(bench, 0.03) == 1
+        assert later(bench, 0.02) == 0
 
-    def test_abort_switches_off(self, watched, device):
+    def test_abort_switches_off(self, bench, device):
         device.fire(arm(device, **LONG))
         device.abort()
-        assert watched.outputs() == 0
+        assert bench.outputs() == 0
         (fault,) = device.collect(LABEL).faults
         assert fault.code == "pulse_aborted"
 
@@ -75,17 +75,17 @@ class OutputSuite(Suite):
         _, certificate = line.drop(release=0, pulse_us=0)
         assert certificate.restarts == 0
 
-    def test_a_reset_switches_off(self, watched, device):
+    def test_a_reset_switches_off(self, bench, device):
         device.fire(arm(device, **LONG))
-        assert later(watched, 0.02) == 1
-        watched.reset()
-        assert watched.outputs() == 0
-        assert later(watched, 0.02) == 0
+        assert later(bench, 0.02) == 1
+        bench.reset()
+        assert bench.outputs() == 0
+        assert later(bench, 0.02) == 0
 
-    def test_what_disarms_itself_never_was_on(self, watched, device):
+    def test_what_disarms_itself_never_was_on(self, bench, device):
         arm(device, timeout_ms=100)
         for _ in range(4):
-            assert later(watched, 0.05) == 0
+            assert later(bench, 0.05) == 0
         assert device.status().phase is wire.Phase.IDLE
 
 
@@ -124,77 +124,75 @@ class SilenceSuite(Suite):
         assert heard == [(0, wire.Disarmed(LABEL, wire.DisarmReason.HOST_SILENT))]
 
 
-def turn(stoppable, stopped: bool) -> None:
+def turn(bench, stopped: bool) -> None:
     """Open or close the emergency stop, and wait until it acts."""
-    stoppable.stop(stopped)
-    stoppable.clock().sleep(1e-3)
+    bench.stop(stopped)
+    bench.clock().sleep(1e-3)
 
 
 class StopSuite(Suite):
-    def test_an_open_stop_forbids_arming(self, stoppable, device):
-        turn(stoppable, True)
+    def test_an_open_stop_forbids_arming(self, bench, device):
+        turn(bench, True)
         assert "emergency stop" in self.refused(wire.RefusalReason.STOPPED, arm, device).message
         self.refused(wire.RefusalReason.STOPPED, arm, device, release=0, pulse_us=0)
         self.refused(wire.RefusalReason.BAD_PARAMETER, arm, device, gates=0)
-        stoppable.lab.hanging = 1
+        bench.lab.hanging = 1
         self.refused(wire.RefusalReason.STOPPED, arm, device)
-        stoppable.lab.hanging = 0
-        turn(stoppable, False)
+        bench.lab.hanging = 0
+        turn(bench, False)
         device.fire(arm(device))
 
-    def test_opening_it_disarms(self, stoppable, device):
+    def test_opening_it_disarms(self, bench, device):
         token = arm(device)
-        stoppable.stop(True)
-        heard = self.heard(stoppable, device, 0.05)
+        bench.stop(True)
+        heard = self.heard(bench, device, 0.05)
         assert heard == [wire.Disarmed(LABEL, wire.DisarmReason.STOPPED)]
         error = self.refused(wire.RefusalReason.NOT_ARMED, device.fire, token)
         assert "emergency stop was opened" in error.message
-        stoppable.stop(False)
+        bench.stop(False)
         self.refused(wire.RefusalReason.NOT_ARMED, device.fire, token)
-        assert stoppable.lab.drops == []
+        assert bench.lab.drops == []
 
-    def test_opening_it_in_a_drop_switches_off_and_records_on(
-        self, stoppable, watched, device, identity
-    ):
+    def test_opening_it_in_a_drop_switches_off_and_records_on(self, bench, device, identity):
         device.fire(arm(device, **LONG))
-        assert later(watched, 0.02) == 1
-        stoppable.stop(True)
-        assert later(watched, 0.001) == 0
+        assert later(bench, 0.02) == 1
+        bench.stop(True)
+        assert later(bench, 0.001) == 0
         assert device.status().phase is wire.Phase.RECORDING
-        stoppable.stop(False)
-        assert later(watched, 0.001) == 0
+        bench.stop(False)
+        assert later(bench, 0.001) == 0
         drop = device.collect(LABEL)
         (fault,) = drop.faults
         assert fault.code == "pulse_stopped"
         assert 0.02 <= fault.values["lasting_s"] < 0.03
-        self.check(stoppable, drop, identity, faults=drop.faults)
+        self.check(bench, drop, identity, faults=drop.faults)
 
     @pytest.mark.parametrize("width", [1e-5, 2e-4])
-    def test_a_spike_at_it_is_no_stop(self, stoppable, device, identity, width):
+    def test_a_spike_at_it_is_no_stop(self, bench, device, identity, width):
         token = arm(device, **LONG)
         for _ in range(3):
-            self.spike(stoppable, width)
+            self.spike(bench, width)
         device.fire(token)
-        stoppable.clock().sleep(0.02)
-        self.spike(stoppable, width)
+        bench.clock().sleep(0.02)
+        self.spike(bench, width)
         drop = device.collect(LABEL)
-        self.check(stoppable, drop, identity)
+        self.check(bench, drop, identity)
         assert drop.certificate.pulse_end == wire.PulseEnd.ORDERED
 
-    def spike(self, stoppable, width):
-        stoppable.stop(True)
-        stoppable.clock().sleep(width)
-        turn(stoppable, False)
+    def spike(self, bench, width):
+        bench.stop(True)
+        bench.clock().sleep(width)
+        turn(bench, False)
 
-    def test_a_drop_is_read_while_it_is_open(self, stoppable, device):
+    def test_a_drop_is_read_while_it_is_open(self, bench, device):
         drop = self.drop(device)
-        stoppable.stop(True)
+        bench.stop(True)
         assert device.status().phase is wire.Phase.HOLDING
         self.release(device, drop)
 
-    def test_a_reset_does_not_close_it(self, stoppable, device):
-        stoppable.stop(True)
-        self.restart(stoppable, device)
+    def test_a_reset_does_not_close_it(self, bench, device):
+        bench.stop(True)
+        self.restart(bench, device)
         self.refused(wire.RefusalReason.STOPPED, arm, device)
 
 
@@ -220,11 +218,11 @@ class CoolingSuite(Suite):
         self.release(device, device.collect(LABEL))
         assert 10 < self.refused(wire.RefusalReason.COOLING, arm, device).detail < 180
 
-    def test_an_open_stop_comes_before_cooling(self, stoppable, device):
+    def test_an_open_stop_comes_before_cooling(self, bench, device):
         self.release(device, self.drop(device, pulse_us=50_000, record_ms=60))
-        turn(stoppable, True)
+        turn(bench, True)
         self.refused(wire.RefusalReason.STOPPED, arm, device)
-        turn(stoppable, False)
+        turn(bench, False)
         self.refused(wire.RefusalReason.COOLING, arm, device)
 
 

@@ -16,12 +16,12 @@ from sim.clock import VirtualClock
 from sim.dials import Dials
 from sim.serial_port import SimulatedSerial
 from sim.snapshots import take_snapshots
-from tests.link.bench import ScriptedLab, VirtualBench
+from tests.link.bench import Bench, ScriptedLab
 from tests.link.conformance import DeviceConformance
 
 
-def bench_of(lab: ScriptedLab, *, line=None, **board) -> VirtualBench:
-    return VirtualBench(lab, VirtualBoard(lab, seed=1, ppm=2000, **board), **(line or {}))
+def bench_of(lab: ScriptedLab, *, line=None, **board) -> Bench:
+    return Bench(lab, VirtualBoard(lab, seed=1, ppm=2000, **board), **(line or {}))
 
 
 class TestVirtualBoard(DeviceConformance):
