@@ -20,6 +20,14 @@ def states(processes: ProcessFixture) -> list[tuple[int, int, str]]:
         return [(e.run, e.attempt, str(e.state)) for e in session.states()]
 
 
+def ended(processes: ProcessFixture, code: int = 0) -> str:
+    """Wait until the daemon has ended, with a code and no traceback, and give what it said."""
+    _, told = processes.daemon.communicate(timeout=PATIENCE_S)
+    assert processes.daemon.returncode == code, told
+    assert "Traceback" not in told
+    return told
+
+
 def let_fall(ask: Callable[..., Any], run: int = 1) -> int:
     """Arm and fire; again where a starved board has disarmed itself. Returns the attempt."""
     for attempt in range(1, 100):

@@ -11,8 +11,8 @@ import pytest
 from bench.process_fixture import ProcessFixture
 from rig.errors import RigError
 from rig.session.store import Session
-from tests.daemon.at_work import working
-from tests.waiting import PATIENCE_S, until
+from tests.daemon.at_work import ended, let_fall, working
+from tests.waiting import until
 
 
 @pytest.fixture
@@ -33,23 +33,10 @@ def drop_once(processes):
     client = processes.client()
     client.take_control()
     client.open_session(str(processes.protocol), str(processes.session))
-    for attempt in range(1, 100):
-        try:
-            client.fire(client.arm(1, attempt))
-        except Exception:  # a starved board has disarmed itself
-            client.stop("again")
-        else:
-            break
+    attempt = let_fall(lambda work: work(client))
     client.collect(1, attempt)
     client.close()
     return attempt
-
-
-def ended(processes, code):
-    _, told = processes.daemon.communicate(timeout=PATIENCE_S)
-    assert processes.daemon.returncode == code, told
-    assert "Traceback" not in told
-    return told
 
 
 def delete(place):

@@ -8,6 +8,7 @@ from rig.daemon.lease import Lease
 from rig.daemon.worker import Worker
 from rig.errors import RigError
 from rig.recorder.published import PublishedState
+from tests.daemon.at_work import ended
 from tests.refusals import refused
 from tests.waiting import PATIENCE_S
 
@@ -30,7 +31,7 @@ def test_a_session_and_a_pulled_cable_are_told_once_each():
         client.close_session()
         client.close()
         processes.daemon.send_signal(signal.SIGTERM)
-        told += processes.daemon.communicate(timeout=PATIENCE_S)[1].splitlines()
+        told += ended(processes).splitlines()
     down = [line for line in told if line.startswith("down: ")]
     assert down
     assert len(set(down)) == len(down)
