@@ -128,12 +128,12 @@ def test_an_input_without_a_gate_is_a_note(monkeypatch):
 
 def test_a_drop_of_a_session_is_not_touched():
     port = port_of(calm())
-    device, order, drop = hold_drop(port, 3)
+    device, label, drop = hold_drop(port, 3)
     found = findings(port=port)
     assert found["held drop"].reason.values == {"run": 3, "attempt": 2}
     assert "rig run" in found["held drop"].advice
     assert found[LIGHT].verdict is Verdict.NOT_POSSIBLE
-    assert device.fetch(order["label"]) == drop
+    assert device.fetch(label) == drop
 
 
 @pytest.mark.parametrize("hz", [50, 60, 100, 120])
@@ -297,14 +297,14 @@ def test_a_restart_in_a_drop_is_timed_and_found_again_in_the_session(doctor, tmp
     path = tmp_path / "s.session"
     with Session.create(path, "x", "x.yaml", simulated=True, origin="x") as session:
         port = port_of(LoopedBoard(Wire(None)))
-        device, order = fire_drop(port, 3, session.log_bytes)
+        device, label = fire_drop(port, 3, session.log_bytes)
         port.clock.sleep(0.004)
         port.board.brown_out(port.clock.now_ns())
         said = (
             r"the board restarted about [45] ms after FIRE: is its supply shared with the magnets\?"
         )
         with pytest.raises(DeviceError, match=said):
-            device.collect(order["label"])
+            device.collect(label)
     done = doctor("--session", path, code=4)
     found = (
         r"^restarts: failed: run 3, attempt 2: about [45] ms after FIRE \(brown-out\)\n  do: is "

@@ -8,12 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from rig.link.messages import Arm, Phase
+from rig.link.messages import Phase
 from rig.selftest.findings import Verdict
 from tests.firmware.toolchain import FIRMWARE, need
 from tests.flash.pty_board import PtyBoard
-from tests.link.bench import LABEL
-from tests.link.talk import connected
+from tests.link.talk import connected, record_drop
 from tests.programs import run_program
 from tests.selftest.benches import outcomes, port_of
 
@@ -21,7 +20,6 @@ FLAGS = "-std=c11 -O1 -Wall -Wextra -Wconversion -Wshadow -Werror -fsanitize=add
 FALL = [30_000, 42_000, 70_000, 82_000, 130_000, 142_000]  # µs, of its first rods
 STEPPED = Path(__file__).with_name("stepped.c")
 WRAP = [f"-Wl,--wrap={name}" for name in ("clock_gettime", "poll", "read", "write")]
-ORDER = {"gates": 3, "release": 0, "pulse_us": 0, "timeout_ms": 500, "record_ms": 150}
 
 
 @pytest.fixture(scope="module")
@@ -111,8 +109,7 @@ def test_its_drop_is_read_by_this_project_and_by_the_client(built):
     with device_of(built) as path:
         port, device = connected(path)
         with closing(port):
-            device.fire(device.arm(Arm(label=LABEL, **ORDER)))
-            drop = device.collect(LABEL)
+            drop = record_drop(device, gates=3, release=0, pulse_us=0)
             assert drop.faults == ()
             assert [edge.tick for edge in drop.edges] == FALL
             assert [edge.channel for edge in drop.edges] == [0, 0, 1, 1, 0, 0]

@@ -1,14 +1,12 @@
 """The Pico's image, in its emulator, against the suite every device must pass."""
 
-import json
-
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
 from rig.errors import InputError
 from rig.link.client import Device
-from rig.link.messages import Arm, Phase, pack_label
-from rig.link.port import open_port, port_clock
+from rig.link.messages import Phase
+from rig.link.port import open_port
 from rig_emulator import boards_bench
 from rig_emulator.pico_board import USB_RATE, EmulatedPico
 from rig_emulator.protocol_emu import EmulatedSerial
@@ -17,12 +15,11 @@ from tests.firmware.pico import build, symbol
 from tests.firmware.toolchain import FIRMWARE
 from tests.link.bench import LABEL, Bench, ScriptedLab, falling_rods
 from tests.link.conformance import DeviceConformance
-from tests.link.talk import arm, connected
+from tests.link.talk import arm, record_drop, release_drop
 from tests.tables import cases
 
 HZ = 20_000_000
 CYCLES = 6 * HZ
-FENCE = FIRMWARE.parent / "protocols" / "picket-fence.yaml"
 
 
 class PicoBench(Bench):
@@ -52,10 +49,10 @@ def test_an_afternoon_with_one():
     assert (identity.tick_hz, identity.gates) == (HZ, 16)
 
     suite = TestPico()
-    drop = suite.drop(device)
+    drop = record_drop(device)
     suite.check(bench, drop, identity)
     assert drop.certificate.supply_mv == pytest.approx(5000, abs=5)
-    suite.release(device, drop)
+    release_drop(device, drop)
 
     # The release rests; then the emergency stop ends a pulse, and the board says by how much.
     bench.clock().sleep(1)
@@ -67,7 +64,7 @@ def test_an_afternoon_with_one():
     on, off = (c.cycle for c in list(bench.board.history)[-3:-1])
     assert drop.certificate.pulse_ticks == (off - on) // 6
     assert off - on == pytest.approx(0.0203 * 1.002 * CYCLES, rel=0.1)
-    suite.release(device, drop)
+    release_drop(device, drop)
     bench.stop(False)
 
     suite.restart(bench, device)
@@ -98,7 +95,7 @@ class TestPico(DeviceConformance):
         bench.lab.changes = [*pulse, (0.02, 1, True), (0.03, 1, False)]
         device = Device(bench.port(), bench.clock())
         device.connect()
-        drop = self.drop(device)
+        drop = record_drop(device)
         assert drop.faults == ()
         assert drop.certificate.glitches == 0
         first, second, *_ = drop.edges
@@ -110,27 +107,3 @@ class TestPico(DeviceConformance):
 def test_the_table_of_figures_is_up_to_date():
     written = (FIRMWARE.parent / "docs" / "results" / "boards.md").read_text()
     assert boards_bench.page() == written, "./run bench boards -o docs/results"
-
-
-def test_chains_fall_before_it_by_its_url(tmp_path):
-    """Every stamp within a tick of the truth, its clock as far off as the dial says."""
-    truth = tmp_path / "truth.jsonl"
-    url = f"emu://?board=pico&seed=3&clock=2000ppm&protocol={FENCE}&truth={truth}"
-    port, _ = connected(url)
-    # The port is opened anew; the board goes on, and says nothing of a start.
-    port.close()
-    port.open()
-    device = Device(port, port_clock(port))
-    identity = device.connect()
-    label = pack_label(1, 1)
-    order = {"release": 1, "pulse_us": 80_000, "timeout_ms": 5000}
-    device.fire(device.arm(Arm(label=label, gates=0b11, record_ms=600, **order)))
-    drop = device.collect(label)
-    port.close()
-    assert drop.faults == ()
-    assert drop.certificate.restarts == 0
-    (line,) = (json.loads(text) for text in truth.read_text("utf-8").splitlines())
-    assert len(drop.edges) == len(line["edges"]) > 20
-    for edge, (seconds, channel, blocked, _) in zip(drop.edges, line["edges"], strict=True):
-        assert (edge.channel, edge.blocked) == (channel, blocked)
-        assert abs(edge.tick - seconds * identity.tick_hz * 1.002) <= 1

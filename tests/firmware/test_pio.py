@@ -5,7 +5,6 @@ import random
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
-from rig.link import messages as wire
 from rig.link.client import Device
 from rig_emulator.pico_board import USB_RATE, EmulatedPico
 from rig_emulator.protocol_emu import EmulatedSerial
@@ -13,6 +12,7 @@ from rig_emulator.wiring import PICO
 from tests.firmware.pico import build, programs
 from tests.firmware.pio_model import Machine
 from tests.link.bench import ScriptedLab
+from tests.link.talk import record_drop
 
 CAPTURE, RELEASE = (0, 5), (18, 26)
 TICK = 6
@@ -117,12 +117,7 @@ def test_the_emulator_stamps_as_the_model_does(words):
     port = EmulatedSerial("test", board=board, timeout=0.02, reset_on_open=False)
     device = Device(port, port.clock)
     device.connect()
-    pulse = {"release": 0b11, "pulse_us": 1000}
-    label = wire.pack_label(1, 1)
-    device.fire(
-        device.arm(wire.Arm(label=label, gates=0xFFFF, record_ms=5, timeout_ms=900, **pulse))
-    )
-    told = device.collect(label)
+    told = record_drop(device, gates=0xFFFF, release=0b11, pulse_us=1000, record_ms=5)
     port.close()
     assert told.faults == ()
     # Where in its loop the machine was at FIRE is one of six.

@@ -10,7 +10,7 @@ import pytest
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
 from rig.flash.boards import TARGETS
 from rig.link.client import Device
-from rig.link.messages import Arm, Phase
+from rig.link.messages import Phase
 from rig.link.port import open_port
 from rig_emulator.board import EmulatedBoard
 from rig_emulator.bootloader import LOADERS, BoughtBoard, behind_loader
@@ -19,6 +19,7 @@ from rig_emulator.wiring import BOARDS, Wiring, firmware_for
 from sim.clock import VirtualClock
 from tests.firmware.toolchain import need
 from tests.link.bench import LABEL
+from tests.link.talk import arm
 from tests.waiting import until
 
 WRITTEN = 3000
@@ -127,8 +128,7 @@ def drop(there: BoughtBoard, wiring: Wiring):
     with closing(open_port(there.path)) as port:
         device = Device(port, BoardTime(there))
         device.connect()
-        order = {"release": 1, "pulse_us": 20_000, "timeout_ms": 2000, "record_ms": 200}
-        device.fire(device.arm(Arm(label=LABEL, gates=1, **order)))
+        device.fire(arm(device, gates=1, record_ms=200))
         with there.lock:
             for n in range(40):
                 there.avr.edge(there.avr.cycle + 1000 * (n + 1), wiring.gates[0], n % 2 == 0)

@@ -8,8 +8,7 @@ from rig.link.client import Device
 from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Incoming
 from rig.records import Drop
-from tests.link.bench import GATES, LABEL, Bench, ScriptedLab, falling_rods
-from tests.link.talk import arm
+from tests.link.bench import GATES, Bench, ScriptedLab, falling_rods
 
 
 class Suite:
@@ -37,15 +36,6 @@ class Suite:
         if not bench.can_sense:
             pytest.skip("the release-sense input cannot be driven here")
         return bench
-
-    def drop(self, device: Device, label: int = LABEL, **changes: int) -> Drop:
-        device.fire(arm(device, label, **changes))
-        return device.collect(label)
-
-    def release(self, device: Device, drop: Drop) -> None:
-        """Let the device forget a drop."""
-        label = wire.pack_label(drop.run, drop.attempt)
-        device.acknowledge(label, drop.certificate.crc32)
 
     def check(self, bench: Bench, drop: Drop, identity: wire.Identity, faults=()) -> None:
         """Compare a drop's edges with what the lab did."""

@@ -6,7 +6,7 @@ from rig.selftest.findings import Verdict
 from rig.selftest.run import selftest
 from tests.link.bench import GATES, LABEL
 from tests.link.suite import Suite
-from tests.link.talk import Wire, arm
+from tests.link.talk import Wire, arm, record_drop, release_drop
 
 NEEDS_HANDS = {"GATE_BLOCKED", "sync output to gate", "GATE_UNSTEADY", "STOPPED", "NOT_KEPT"}
 
@@ -26,11 +26,11 @@ class DropSuite(Suite):
         assert state.gates & GATES == 0x0201
 
     def test_a_drop_comes_whole_and_exact(self, bench, device, identity):
-        drop = self.drop(device)
+        drop = record_drop(device)
         self.check(bench, drop, identity)
         assert (drop.run, drop.attempt) == (7, 1)
         assert bench.lab.drops == [LABEL]
-        self.release(device, drop)
+        release_drop(device, drop)
         assert device.status().phase is wire.Phase.IDLE
 
     def test_only_armed_gates_are_recorded(self, bench):
@@ -41,7 +41,7 @@ class DropSuite(Suite):
 
     def test_a_blocked_gate_that_is_not_armed_does_not_matter(self, bench, device, identity):
         bench.lab.hanging = 0x0800
-        self.check(bench, self.drop(device), identity)
+        self.check(bench, record_drop(device), identity)
 
     def test_the_32_bit_time_may_wrap_within_a_drop(self, bench, device, identity):
         bench.preset_tick(seconds_before_wrap=0.05)
@@ -71,16 +71,16 @@ class InputSuite(Suite):
 
     def test_the_release_sense_is_timed(self, sensing, device, identity):
         sensing.sense(0.012)
-        drop = self.drop(device)
+        drop = record_drop(device)
         self.check(sensing, drop, identity)
         self.close(sensing, identity, drop.certificate.release_sense, 0.012)
 
     def test_without_a_change_there_is_no_release_sense(self, device):
-        assert self.drop(device).certificate.release_sense is None
+        assert record_drop(device).certificate.release_sense is None
 
     def test_a_change_behind_the_recording_is_not_of_the_drop(self, sensing, device):
         sensing.sense(0.1)
-        assert self.drop(device, record_ms=50).certificate.release_sense is None
+        assert record_drop(device, record_ms=50).certificate.release_sense is None
 
 
 class RefusalSuite(Suite):

@@ -4,19 +4,19 @@ from rig.errors import DeviceError
 from rig.link import messages as wire
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
-from tests.link.talk import Wire, arm
+from tests.link.talk import Wire, arm, record_drop, release_drop
 from tests.refusals import refused
 
 
 class HoldSuite(Suite):
     def test_a_drop_is_held_across_reconnects_and_silence(self, bench, device):
-        drop = self.drop(device)
+        drop = record_drop(device)
         bench.reopen()
         bench.clock().sleep(0.4)
         again = self.reconnected(bench)
         assert again.status().label == LABEL
         assert again.fetch(LABEL) == drop
-        self.release(again, drop)
+        release_drop(again, drop)
 
     def test_any_part_can_be_read_again(self, bench):
         line = Wire(bench)
@@ -43,7 +43,7 @@ class HoldSuite(Suite):
         self.refused(wire.RefusalReason.NOT_ARMED, device.fire, token)
 
     def test_a_held_drop_outlives_resets(self, bench, device):
-        drop = self.drop(device)
+        drop = record_drop(device)
         device.abort()
         self.restart(bench, device)
         self.restart(bench, device)
@@ -53,7 +53,7 @@ class HoldSuite(Suite):
         assert state.events == drop.certificate.events
         self.refused(wire.RefusalReason.HOLDING_A_DROP, arm, again)  # that ABORT came is forgotten
         assert again.fetch(LABEL) == drop
-        self.release(again, drop)
+        release_drop(again, drop)
         self.restart(bench, device)
         assert device.status().phase is wire.Phase.IDLE
 

@@ -8,7 +8,7 @@ from rig.link.transcript import Transcript
 from rig.records import ClockSample, Drop, Edge
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
-from tests.link.talk import LossyPort, NoisyPort, Wire, arm, order
+from tests.link.talk import LossyPort, NoisyPort, Wire, arm, order, record_drop, release_drop
 
 
 class LineSuite(Suite):
@@ -34,9 +34,9 @@ class LineSuite(Suite):
         device = Device(port, bench.clock(), tries=40)
         device.connect()
         for run in range(3):
-            drop = self.drop(device, wire.pack_label(run, 1))
+            drop = record_drop(device, wire.pack_label(run, 1))
             self.check(bench, drop, device.transcript.identity)
-            self.release(device, drop)
+            release_drop(device, drop)
         assert device.transcript.rx.bad > 0
         assert bench.lab.drops == [wire.pack_label(run, 1) for run in range(3)]
 
@@ -52,8 +52,8 @@ class LineSuite(Suite):
         )
         device.connect()
         device.ping()
-        pending = self.drop(device)
-        self.release(device, pending)
+        pending = record_drop(device)
+        release_drop(device, pending)
         offline = Transcript()
         records = [record for chunk in chunks for record in offline.feed(*chunk)]
         assert records == live

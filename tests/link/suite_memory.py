@@ -8,7 +8,7 @@ from rig.link import messages as wire
 from rig.reasons import make_reason
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
-from tests.link.talk import LossyPort, Wire, arm
+from tests.link.talk import LossyPort, Wire, arm, record_drop, release_drop
 
 _SPACING_S = 3e-4
 
@@ -35,13 +35,13 @@ class MemorySuite(Suite):
             pytest.skip("a device that streams does not keep a drop whole")
         count = identity.capacity + 20
         bench.lab.changes = blinking(count)
-        drop = self.drop(device, record_ms=record_ms(count))
+        drop = record_drop(device, record_ms=record_ms(count))
         assert len(drop.edges) == drop.certificate.events == identity.capacity
         assert drop.certificate.overflows == 20
         assert drop.faults == (make_reason("edges_lost", lost=20),)
 
     def test_a_streamed_drop_may_be_longer_than_the_memory(self, bench, device, identity, more):
-        drop = self.drop(device, record_ms=record_ms(more))
+        drop = record_drop(device, record_ms=record_ms(more))
         self.check(bench, drop, identity)
         late = self.reconnected(bench).fetch(LABEL)
         assert late.edges == drop.edges[-len(late.edges) :]
@@ -69,7 +69,7 @@ class MemorySuite(Suite):
         overwritten = make_reason("events_overwritten", missing=60, events=more, first=0)
         assert drop.faults == (overwritten,)
         assert len(drop.edges) == identity.capacity - 1  # behind the gap one change is in doubt
-        self.release(device, drop)
+        release_drop(device, drop)
 
     def test_a_short_pulse_is_an_event_and_no_edge(self, bench):
         """Its second edge may find the interrupt free again, and give a second event."""

@@ -6,7 +6,7 @@ from rig.link import messages as wire
 from rig.link.frames import Frame, encode
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
-from tests.link.talk import Wire, arm
+from tests.link.talk import Wire, arm, record_drop, release_drop
 
 LONG = {"pulse_us": 100_000, "record_ms": 150}
 
@@ -185,10 +185,10 @@ class StopSuite(Suite):
         turn(bench, False)
 
     def test_a_drop_is_read_while_it_is_open(self, bench, device):
-        drop = self.drop(device)
+        drop = record_drop(device)
         bench.stop(True)
         assert device.status().phase is wire.Phase.HOLDING
-        self.release(device, drop)
+        release_drop(device, drop)
 
     def test_a_reset_does_not_close_it(self, bench, device):
         bench.stop(True)
@@ -198,7 +198,7 @@ class StopSuite(Suite):
 
 class CoolingSuite(Suite):
     def test_a_release_rests_for_three_pulses(self, bench, device):
-        self.release(device, self.drop(device, pulse_us=50_000, record_ms=60))
+        release_drop(device, record_drop(device, pulse_us=50_000, record_ms=60))
         bench.lab.hanging = 1
         error = self.refused(wire.RefusalReason.COOLING, arm, device)
         assert 80 < error.detail <= 141
@@ -215,11 +215,11 @@ class CoolingSuite(Suite):
         device.fire(arm(device, **LONG))
         bench.clock().sleep(0.04)
         device.abort()
-        self.release(device, device.collect(LABEL))
+        release_drop(device, device.collect(LABEL))
         assert 10 < self.refused(wire.RefusalReason.COOLING, arm, device).detail < 180
 
     def test_an_open_stop_comes_before_cooling(self, bench, device):
-        self.release(device, self.drop(device, pulse_us=50_000, record_ms=60))
+        release_drop(device, record_drop(device, pulse_us=50_000, record_ms=60))
         turn(bench, True)
         self.refused(wire.RefusalReason.STOPPED, arm, device)
         turn(bench, False)

@@ -1,6 +1,8 @@
 """Ways to speak to a device under test: good requests, single frames, bad lines."""
 
 import random
+from pathlib import Path
+from urllib.parse import quote
 
 import serial
 
@@ -8,8 +10,10 @@ from rig.link import messages as wire
 from rig.link.client import BOOT_WAIT_S, Device
 from rig.link.frames import Decoder, Frame, encode
 from rig.link.port import open_port, port_clock
+from rig.records import Drop
 from tests.link.bench import GATES, LABEL, Bench
 
+FENCE = Path(__file__).parents[2] / "protocols/picket-fence.yaml"
 ORDER = {"gates": GATES, "release": 1, "pulse_us": 20_000, "timeout_ms": 5000, "record_ms": 150}
 
 
@@ -17,8 +21,25 @@ def arm(device: Device, label: int = LABEL, **changes: int) -> int:
     return device.arm(wire.Arm(**{"label": label} | ORDER | changes))
 
 
+def record_drop(device: Device, label: int = LABEL, **changes: int) -> Drop:
+    device.fire(arm(device, label, **changes))
+    return device.collect(label)
+
+
+def release_drop(device: Device, drop: Drop) -> None:
+    """Let the device forget a drop."""
+    label = wire.pack_label(drop.run, drop.attempt)
+    device.acknowledge(label, drop.certificate.crc32)
+
+
 def order(**changes: int) -> wire.Arm:
     return wire.Arm(**({"label": LABEL} | ORDER | changes))
+
+
+def url(scheme: str, protocol: Path = FENCE, **settings: object) -> str:
+    """Write the URL of a simulated or an emulated board, every value escaped."""
+    said = {"protocol": str(protocol), **settings}
+    return f"{scheme}://?" + "&".join(f"{name}={quote(str(value))}" for name, value in said.items())
 
 
 def connected(where: str, *tap, **options) -> tuple[serial.SerialBase, Device]:

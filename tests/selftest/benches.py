@@ -7,6 +7,7 @@ from rig.selftest.findings import Verdict
 from rig.selftest.run import selftest
 from sim.board import VirtualBoard
 from sim.serial_port import SimulatedSerial
+from tests.link.talk import arm
 
 GATE = 3
 
@@ -55,16 +56,15 @@ def port_of(board, **settings):
 
 
 def fire_drop(port, run, *tap):
-    """Have a board begin a drop; give the client and the order of the drop."""
+    """Have a board begin a drop without its release; give the client and the drop's label."""
     device = Device(port, port.clock, *tap)
     device.connect()
-    order = {"gates": 1 << GATE, "release": 0, "pulse_us": 0, "timeout_ms": 999, "record_ms": 50}
-    order["label"] = wire.pack_label(run, 2)
-    device.fire(device.arm(wire.Arm(**order)))
-    return device, order
+    label = wire.pack_label(run, 2)
+    device.fire(arm(device, label, gates=1 << GATE, release=0, pulse_us=0, record_ms=50))
+    return device, label
 
 
 def hold_drop(port, run):
-    """Have a board hold a drop; give the client, the order of the drop and the drop."""
-    device, order = fire_drop(port, run)
-    return device, order, device.collect(order["label"])
+    """Have a board hold a drop; give the client, the drop's label and the drop."""
+    device, label = fire_drop(port, run)
+    return device, label, device.collect(label)

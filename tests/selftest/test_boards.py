@@ -17,6 +17,7 @@ from rig.selftest.findings import Verdict
 from rig.selftest.run import CHECKS, run_checks, selftest
 from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
+from tests.link.talk import arm
 from tests.selftest.benches import GATE, LoopedBoard, Wire, hold_drop, outcomes, port_of
 from tests.selftest.broken import BROKEN, claims, odd
 from tests.tables import cases
@@ -136,7 +137,7 @@ def test_behind_a_terminal_in_real_time(rig):
 def test_a_drop_of_a_session_is_left_alone(monkeypatch):
     monkeypatch.setattr("sim.board.Microcontroller", claims("gates", lambda gates: gates | 1))
     port = port_of(LoopedBoard(Wire()))
-    _, order, drop = hold_drop(port, 7)
+    _, label, drop = hold_drop(port, 7)
     results = outcomes(port)
     assert failed(results) == []
     possible = {name for name, finding in results.items() if finding.verdict is Verdict.OK}
@@ -145,9 +146,9 @@ def test_a_drop_of_a_session_is_left_alone(monkeypatch):
     assert results["RECORDING"].reason.values == {"run": 7, "attempt": 2}
     again = Device(port, port.clock)
     again.connect(boot_wait_s=0)
-    assert again.fetch(order["label"]) == drop
+    assert again.fetch(label) == drop
     with pytest.raises(DeviceError, match="still holds the drop of run 7"):
-        again.arm(wire.Arm(**order))  # no ABORT made it free to be discarded
+        arm(again, label)  # no ABORT made it free to be discarded
 
 
 def test_a_drop_that_an_earlier_test_left_is_cleared_away():

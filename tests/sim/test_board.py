@@ -18,6 +18,7 @@ from sim.serial_port import SimulatedSerial
 from sim.snapshots import take_snapshots
 from tests.link.bench import Bench, ScriptedLab
 from tests.link.conformance import DeviceConformance
+from tests.link.talk import record_drop
 
 
 def bench_of(lab: ScriptedLab, *, line=None, **board) -> Bench:
@@ -29,12 +30,12 @@ class TestVirtualBoard(DeviceConformance):
         return bench_of(lab)
 
     def test_edges_are_exact(self, bench, device):
-        drop = self.drop(device)
+        drop = record_drop(device)
         hz = 16e6 * 1.002
         assert [e.tick for e in drop.edges] == [round(c[0] * hz) for c in bench.lab.changes]
 
     def test_a_drop_does_not_outlive_the_power(self, bench, device):
-        self.drop(device)
+        record_drop(device)
         bench.board.reset(bench.clock().now_ns(), POWER_ON)
         device.connect()
         assert device.status().phase is Phase.IDLE
@@ -53,7 +54,7 @@ class TestStreamingBoard(DeviceConformance):
 
     def test_a_line_too_slow_for_the_events_loses_some(self, bench, device):
         bench.lab.changes = [(0.01 + 20e-6 * n, 0, n % 2 == 0) for n in range(1000)]
-        drop = self.drop(device)
+        drop = record_drop(device)
         assert 0 < drop.certificate.overflows < 900
         assert drop.certificate.events + drop.certificate.overflows == 1000
         assert drop.faults[0].code == "edges_lost"

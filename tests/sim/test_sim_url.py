@@ -2,24 +2,20 @@
 
 import json
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from urllib.parse import quote
 
 import pytest
 
-from rig.link.messages import Arm, pack_label
+from rig.link.messages import pack_label
 from rig.records import ClockSample, Drop
 from sim.line import BadLine
-from tests.link.talk import connected
+from tests.link.talk import connected, record_drop, release_drop, url
 from tests.sim.falls import PROTOCOLS
 
-FENCE = PROTOCOLS / "picket-fence.yaml"
 HZ = 16_000_000
-
-
-def url(protocol: Path = FENCE, **settings: object) -> str:
-    said = {"protocol": str(protocol), **settings}
-    return "sim://?" + "&".join(f"{name}={quote(str(value))}" for name, value in said.items())
+CHAINS = PROTOCOLS / "inclined-uniform.yaml"
+sim_url = partial(url, "sim")
 
 
 @dataclass
@@ -40,18 +36,15 @@ def talk(where: str, gates: int = 0b11, runs=((1, 1),), pings: int = 3) -> Talk:
         if ping is not None:
             done.pings.append(ping)
     for run, attempt in runs:
-        label = pack_label(run, attempt)
-        order = {"release": 1, "pulse_us": 80_000, "timeout_ms": 5000, "record_ms": 900}
-        device.fire(device.arm(Arm(label=label, gates=gates, **order)))
-        drop = device.collect(label)
-        device.acknowledge(label, drop.certificate.crc32)
-        done.drops.append(drop)
+        order = {"gates": gates, "pulse_us": 80_000, "record_ms": 900}
+        done.drops.append(record_drop(device, pack_label(run, attempt), **order))
+        release_drop(device, done.drops[-1])
     port.close()
     return done
 
 
 def test_the_same_seed_gives_the_same_conversation_byte_for_byte():
-    one, two, other = (talk(url(seed=seed), runs=((1, 1), (2, 1))) for seed in (3, 3, 4))
+    one, two, other = (talk(sim_url(seed=seed), runs=((1, 1), (2, 1))) for seed in (3, 3, 4))
     assert one == two
     assert [c for c in one.chunks if c[0] == "rx"] != [c for c in other.chunks if c[0] == "rx"]
     assert one.drops[0].edges != other.drops[0].edges
@@ -64,9 +57,7 @@ def truth_lines(file: Path) -> list[dict]:
 def test_the_truth_file_tells_what_is_on_the_wire(tmp_path):
     file = tmp_path / "truth of it.jsonl"
     runs = ((1, 1), (2, 1), (2, 2))
-    done = talk(
-        url(PROTOCOLS / "inclined-uniform.yaml", seed=5, truth=file, clock="2000 ppm"), 0xFFFF, runs
-    )
+    done = talk(sim_url(CHAINS, seed=5, truth=file, clock="2000 ppm"), 0xFFFF, runs)
     lines = truth_lines(file)
     assert [(line["run"], line["attempt"]) for line in lines] == list(runs)
     assert [(drop.run, drop.attempt) for drop in done.drops] == list(runs)
@@ -85,10 +76,9 @@ def test_the_truth_file_tells_what_is_on_the_wire(tmp_path):
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_bad_line_still_gives_the_whole_drop_once(tmp_path, seed):
-    scene, gates = PROTOCOLS / "inclined-uniform.yaml", 0xFFFF
     file = tmp_path / "truth.jsonl"
-    bad = talk(url(scene, seed=seed, corrupt="0.2 %", lose="0.1 %", truth=file), gates)
-    clean = talk(url(scene, seed=seed), gates)
+    bad = talk(sim_url(CHAINS, seed=seed, corrupt="0.2 %", lose="0.1 %", truth=file), 0xFFFF)
+    clean = talk(sim_url(CHAINS, seed=seed), 0xFFFF)
     assert bad.drops[0].faults == ()
     assert bad.drops[0].edges == clean.drops[0].edges
     assert len(bad.chunks) > len(clean.chunks)  # something had to be said twice
@@ -96,9 +86,9 @@ def test_a_bad_line_still_gives_the_whole_drop_once(tmp_path, seed):
 
 
 def test_a_percent_sign_need_not_be_escaped():
-    plain = url(seed=1) + "&missed=20%&skew_sd=4 ms&clock=-1300 ppm"
-    escaped = url(seed=1, missed="20 %", skew_sd="4ms", clock="-1300ppm")
-    assert talk(plain) == talk(escaped) != talk(url(seed=1))
+    plain = sim_url(seed=1) + "&missed=20%&skew_sd=4 ms&clock=-1300 ppm"
+    escaped = sim_url(seed=1, missed="20 %", skew_sd="4ms", clock="-1300ppm")
+    assert talk(plain) == talk(escaped) != talk(sim_url(seed=1))
 
 
 def test_a_busy_line_changes_only_what_goes_both_ways_at_once():
