@@ -9,38 +9,30 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mpmath.ctx_mp import MPContext
+from mpmath import mp
 
 from rig.protocol import protocol, reader
+from tests.model.reference import exact_gains, exact_hits, printed_alpha
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 UNIFORM = reader.read(PROTOCOLS / "inclined-uniform.yaml")
 WITHOUT_GATES = replace(UNIFORM, gates=protocol.Gates())
 
-mp = MPContext()  # of its own, so that no other test's digits change
-mp.dps = 40
-mpf = mp.mpf
-
 RODS = 25
-SPACING = mpf("1.165") / 24
-DROP = mpf("0.18")
-GRAVITY = mpf("9.81")
-TILT = mp.radians(12)
-WIDTH = mpf("0.0127") / mp.cos(TILT)
-INERTIA = mpf(1) / 3
-GAMMA = (1 + INERTIA) * (1 + 1 / INERTIA) / 4  # Eq. 10
-PLACES = [DROP + k * SPACING for k in range(RODS)]
+with mp.workdps(40):
+    DROP, GRAVITY, INERTIA = mp.mpf("0.18"), mp.mpf("9.81"), mp.mpf(1) / 3
+    WIDTH = mp.mpf("0.0127") / mp.cos(mp.radians(12))
+    GAMMA = (1 + INERTIA) * (1 + 1 / INERTIA) / 4  # Eq. 10
+    PLACES = [DROP + k * mp.mpf("1.165") / 24 for k in range(RODS)]
 DELAY = 0.02  # of the release behind the fire stamp, by default
 
 
+@mp.workdps(40)
 def alpha(incline: float, beta: str = "0.5", mu: str = "0.2", pile: str = "-0.37") -> Any:
     """Eq. 8 on the pile, which gathers below 30°, Eqs. 12 and 13 on the slope."""
     if incline < 30:
-        return (1 + mpf(pile)) / 4 * (1 - INERTIA)
-    theta, beta, mu = mp.radians(incline), mpf(beta), mpf(mu)
-    slide = (1 - mu * mp.cot(theta)) / (1 + mu * mp.tan(theta))
-    g = mp.cos(theta) ** 2 + mp.sin(theta) ** 2 * GAMMA * slide
-    return (1 + beta) / 4 * (1 - INERTIA) * mp.cos(theta) ** 2 / g
+        return (1 + mp.mpf(pile)) / 4 * (1 - INERTIA)
+    return printed_alpha(beta, mu, incline, INERTIA)
 
 
 class ByHand:
@@ -49,34 +41,29 @@ class ByHand:
     `places` are the rods' heights above the contact point before release.
     """
 
+    @mp.workdps(40)
     def __init__(self, alphas: list, places: list = PLACES) -> None:
         self.places = places
-        self.times, self.before, self.after = [], [], []
-        time = speed = mpf(0)
-        for k, a in enumerate(alphas):
-            distance = places[k] - (places[k - 1] if k else 0)
-            arrival = mp.sqrt(speed**2 + 2 * GRAVITY * distance)
-            time += (arrival - speed) / GRAVITY
-            above = len(alphas) - 1 - k  # rods of one mass: m = 1, M = their number
-            impulse = a * arrival / (1 + GAMMA / above) if above else 0  # Eq. 9
-            speed = arrival + (impulse / above if above else 0)
-            self.times.append(time)
-            self.before.append(arrival)
-            self.after.append(speed)
+        gains = exact_gains([1] * len(alphas), alphas, GAMMA)
+        still = [0] * len(alphas)
+        hits = exact_hits([place - DROP for place in places], gains, still, DROP, GRAVITY, 0)
+        self.times, self.before, self.after = zip(*hits, strict=True)
 
     @classmethod
     def at(cls, incline: float, places: list = PLACES, **coefficients: str) -> ByHand:
         return cls([alpha(incline, **coefficients)] * RODS, places)
 
     @property
+    @mp.workdps(40)
     def separation(self) -> Any:
         """Δz: where the free twin's top rod is when this chain's top rod hits."""
         return self.places[-1] - GRAVITY * self.times[-1] ** 2 / 2
 
+    @mp.workdps(40)
     def time_down(self, distance: Any) -> Any:
         """When the chain has come down by a distance since its release."""
-        done = mpf(0)
-        time = speed = mpf(0)
+        done = mp.mpf(0)
+        time = speed = mp.mpf(0)
         for place, when, after in zip(self.places, self.times, self.after, strict=True):
             if distance <= place:
                 break
@@ -84,6 +71,7 @@ class ByHand:
         return time + (mp.sqrt(speed**2 + 2 * GRAVITY * (distance - done)) - speed) / GRAVITY
 
 
+@mp.workdps(40)
 def free_time_down(distance: Any) -> Any:
     return mp.sqrt(2 * distance / GRAVITY)
 
@@ -94,7 +82,7 @@ def crossings(
     """(seconds since release, blocked, rod) at one beam."""
     found = []
     for k, place in enumerate(places):
-        above = place - mpf(gate_height)
+        above = place - mp.mpf(gate_height)
         if above > 0:
             found.append((float(time_down(above - WIDTH / 2)), True, k))
             found.append((float(time_down(above + WIDTH / 2)), False, k))
