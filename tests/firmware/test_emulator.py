@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -20,8 +21,9 @@ from rig_emulator.controller import Stop
 from rig_emulator.wiring import BOARDS, board_named, firmware_for
 from tests.firmware.emulated import MCUS
 from tests.firmware.pico import build
-from tests.firmware.toolchain import make
+from tests.firmware.toolchain import FIRMWARE, make, need
 from tests.link.talk import FENCE, connected, record_drop, url
+from tests.programs import run_program
 from tests.refusals import refused
 from tests.tables import cases
 from tests.waiting import PATIENCE_S
@@ -31,6 +33,22 @@ ENTRY = {"atmega2560": 5, "atmega328p": 4}  # "Interrupt Response Time", then a 
 OTHER = {"atmega2560": "PK", "atmega328p": "PD"}
 LED = {"atmega2560": "PA0", "atmega328p": "PC0"}
 each_mcu = pytest.mark.parametrize("mcu", MCUS)
+
+
+STRICT = "-std=gnu11 -Wall -Wextra -Wshadow -Werror -Os -DF_CPU=16000000UL"
+
+
+@pytest.fixture
+def compiled(tmp_path) -> Callable[[str, str], Path]:
+    """Compile a program of the emulator's for a controller."""
+    need("avr-gcc")
+
+    def compile_for(source: str, mcu: str) -> Path:
+        words = *STRICT.split(), f"-mmcu={mcu}", FIRMWARE / "emulator" / source
+        run_program("avr-gcc", *words, "-o", program := tmp_path / "program.elf")
+        return program
+
+    return compile_for
 
 
 def stamping(program: Path, mcu: str) -> tuple[Avr, int]:
