@@ -122,18 +122,8 @@ def test_the_command_leaves_page_and_table(tmp_path, monkeypatch, capsys, here):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     worlds = {name: world._replace(repeats=(1,)) for name, world in coverage.WORLDS.items()}
     monkeypatch.setattr(coverage, "WORLDS", worlds)
-    words = [
-        "coverage",
-        "-o",
-        str(tmp_path),
-        "--rigs",
-        "2",
-        "--world",
-        "resolved",
-        "model",
-        "usual",
-    ]
-    assert main(words) == 0
+    words = ["coverage", "--rigs", "2", "--world", "resolved", "model", "usual", "-o"]
+    assert main([*words, str(tmp_path)]) == 0
     assert "SIMULATED DATA" in capsys.readouterr().out
     whole = json.loads((tmp_path / "coverage.json").read_text())
     assert [*whole] == ["resolved", "model", "usual"]

@@ -7,8 +7,6 @@ import os
 import resource
 import socket
 import stat
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -21,7 +19,6 @@ from rig.daemon.socket_path import default_socket, prepare_folder
 from rig.errors import BusyError, DeviceError, InputError, RigError, VersionError
 from tests.refusals import refused
 from tests.tables import cases
-from tests.waiting import PATIENCE_S
 
 _SECTIONS = {
     "daemon", "port", "link", "device", "statistics", "gates", "phase", "drop", "edges", "session",
@@ -203,45 +200,31 @@ FEW = 200  # descriptors that the daemon may have: fewer than come
 
 
 @pytest.fixture
-def daemon(tmp_path):
-    """Start a daemon of a simulated port, with few descriptors."""
-    tmp_path.chmod(0o700)
-    path = tmp_path / "rig.sock"
-    started = subprocess.Popen(
-        [sys.executable, "-W", "error", "-m", "rig", "daemon", "--port", "sim://",
-         "--socket", path],
-        stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    try:
-        assert started.stderr.readline().startswith("rig daemon: sim://")
-        resource.prlimit(started.pid, resource.RLIMIT_NOFILE, (FEW, FEW))
-        yield path, started
-    finally:
-        started.terminate()
-        started.communicate(timeout=PATIENCE_S)
+def crowded(processes):
+    """Have a daemon with few descriptors."""
+    resource.prlimit(processes.daemon.pid, resource.RLIMIT_NOFILE, (FEW, FEW))
+    return processes
 
 
-def test_a_silent_crowd_keeps_nobody_out(daemon):
-    path, _ = daemon
+def test_a_silent_crowd_keeps_nobody_out(crowded):
     with contextlib.ExitStack() as crowd:
         for number in range(2 * FEW):
             line = crowd.enter_context(socket.socket(socket.AF_UNIX))
             line.setblocking(False)
             with contextlib.suppress(BlockingIOError):
-                line.connect(str(path))
+                line.connect(str(crowded.socket))
                 line.send(b"{" * (number % 2))  # some begin a line
-        client = Client(Line(path, "the one that means it"))
+        client = crowded.client("the one that means it")
         client.stop("enough")
         client.close()
 
 
-def test_many_at_once_are_all_answered_or_told_that_it_is_busy(daemon):
-    path, started = daemon
+def test_many_at_once_are_all_answered_or_told_that_it_is_busy(crowded):
     with contextlib.ExitStack() as crowd:
 
         def come(number):
             try:
-                crowd.callback(Client(Line(path, f"client {number}")).close)
+                crowd.callback(crowded.client(f"client {number}").close)
             except BusyError:
                 return 0
             return 1
@@ -249,7 +232,7 @@ def test_many_at_once_are_all_answered_or_told_that_it_is_busy(daemon):
         with ThreadPoolExecutor(160) as pool:
             let_in = sum(pool.map(come, range(160)))
         assert let_in + sum(map(come, range(let_in, connection.CLIENTS))) >= connection.CLIENTS
-    assert started.poll() is None
+    assert crowded.daemon.poll() is None
 
 
 def test_a_door_at_which_nobody_ever_looks_is_not_waited_at_for_ever(tmp_path, monkeypatch):
