@@ -244,46 +244,6 @@ def test_a_lock_that_a_dead_process_left_says_nothing(copy):
     assert examine(copy).snapshot.writer == ""
 
 
-# -- what is no session
-
-
-def database(path):
-    with closing(sqlite3.connect(path)) as connection:
-        connection.execute("CREATE TABLE t (a, b)")
-        connection.execute("INSERT INTO t VALUES (1, 2)")
-        connection.commit()
-
-
-@pytest.mark.parametrize(
-    ("make", "says"),
-    [
-        (database, "it is another program's SQLite database"),
-        (lambda path: path.touch(), "it is empty"),
-        (lambda path: path.write_text("protocol: 1\n" * 999), "nothing of a session in it"),
-        (lambda path: path.write_bytes(random.Random(1).randbytes(50_000)), "nothing of a session"),
-        (lambda path: path.write_bytes(b"SQLite format 3\0"), "nothing of a session"),
-    ],
-)
-def test_what_is_no_session(make, says, tmp_path, call):
-    path = tmp_path / "thing"
-    make(path)
-    done = call("recover", path, code=2)
-    assert f"not a session: {says}" in done.out or says in str(examine(path).foreign)
-    call("recover", path, "-o", tmp_path / "new", code=2)
-    assert not (tmp_path / "new").exists()
-
-
-@pytest.mark.parametrize("name", ["nothing.session", "."])
-def test_what_cannot_be_read(name, tmp_path):
-    with pytest.raises(SessionError):
-        examine(tmp_path / name)
-
-
-def test_a_session_of_a_newer_rig_is_left_alone(copy):
-    alter(copy, "PRAGMA user_version = 99")
-    assert "newer rig" in examine(copy).foreign
-
-
 def test_a_file_that_may_only_be_read(copy, monkeypatch):
     monkeypatch.setattr("os.access", lambda *_: False)  # root may write everything
     assert any("may not be written" in line for line in describe(examine(copy)))

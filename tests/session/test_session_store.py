@@ -1,6 +1,7 @@
 """The session keeps what it is given, in order, and lets nobody alter it unnoticed."""
 
 import os
+import random
 import shutil
 import sqlite3
 import subprocess
@@ -364,23 +365,29 @@ def cut(path):
     path.write_bytes(path.read_bytes()[:5000])
 
 
+LATER_FORMAT = f"PRAGMA user_version = {SCHEMA_VERSION + 1}"
+UNDATED = "UPDATE meta SET value = 'x' WHERE key = 'created'"
+NOISE = random.Random(1).randbytes(50_000)
+NOTHING = "not a session: there is nothing of a session in it"
 NO_SESSIONS = {
-    "missing": (lambda path: None, "no session at"),
-    "folder": (lambda path: path.mkdir(), "folder"),
-    "empty": (lambda path: path.write_bytes(b""), "empty"),
-    "text": (lambda path: path.write_text("run,channel,time_s,state\n" * 400), "not a session"),
-    "byte": (lambda path: path.write_bytes(b"x"), "not a session"),
-    "foreign": (database, "another program's"),
-    "newer": (altered(f"PRAGMA user_version = {SCHEMA_VERSION + 1}"), "newer rig"),
-    "undated": (altered("UPDATE meta SET value = 'x' WHERE key = 'created'"), "when it was made"),
-    "hollow": (hollow, "not a session|cannot be used|damaged"),
-    "cut": (cut, "damaged"),
+    "missing": (lambda path: None, "no session at", "No such file"),
+    "folder": (lambda path: path.mkdir(), "folder", "folder"),
+    "empty": (lambda path: path.touch(), "empty", "not a session: it is empty"),
+    "text": (lambda path: path.write_text("run,state\n" * 400), "not a session", NOTHING),
+    "noise": (lambda path: path.write_bytes(NOISE), "not a session", NOTHING),
+    "head": (lambda path: path.write_bytes(b"SQLite format 3\0"), "damaged|not a s", NOTHING),
+    "byte": (lambda path: path.write_bytes(b"x"), "not a session", NOTHING),
+    "foreign": (database, "another program's", "it is another program's SQLite database"),
+    "newer": (altered(LATER_FORMAT), "newer rig", "not a session: it was written by a newer rig"),
+    "undated": (altered(UNDATED), "when it was made", None),
+    "hollow": (hollow, "not a session|cannot be used|damaged", None),
+    "cut": (cut, "damaged", None),
 }
 
 
 @pytest.mark.parametrize("readonly", [False, True])
-@pytest.mark.parametrize(("prepare", "words"), NO_SESSIONS.values(), ids=NO_SESSIONS)
-def test_what_is_no_session(path, prepare, words: str, readonly: bool):
+@pytest.mark.parametrize(("prepare", "words", "told"), NO_SESSIONS.values(), ids=NO_SESSIONS)
+def test_what_is_no_session(path, prepare, words: str, told: str | None, readonly: bool, call):
     prepare(path)
     before = path.read_bytes() if path.is_file() else None
     error = refused(SessionError, words, Session.open, path, readonly=readonly)
@@ -388,6 +395,10 @@ def test_what_is_no_session(path, prepare, words: str, readonly: bool):
     assert error.exit_code == 2
     assert (path.read_bytes() if path.is_file() else None) == before
     assert not path.with_name(path.name + ".lock").exists()
+    if told is not None:  # of others `rig recover` may save something
+        assert told in "".join(call("recover", path, code=2)[1:])
+        call("recover", path, "-o", path.with_name("new"), code=2)
+        assert not path.with_name("new").exists()
 
 
 def record(session, run):
