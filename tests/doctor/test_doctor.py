@@ -5,7 +5,7 @@ import os
 import random
 import re
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import Mock
@@ -258,8 +258,12 @@ def test_a_session(tmp_path):
 # -- the command
 
 
+packages_here = cache(check_packages)  # which takes longer than all that a command looks at else
+
+
 @pytest.fixture
 def doctor(call, monkeypatch, tmp_path):
+    monkeypatch.setattr("rig.doctor.computer.check_packages", packages_here)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("serial.tools.list_ports.comports", list)
     return partial(call, "doctor")
