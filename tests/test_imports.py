@@ -7,26 +7,17 @@ import sys
 import tomllib
 from pathlib import Path
 
-import pytest
-
 from rig.cli import OPTIONAL
 from rig.flash.boards import TARGETS
 from rig.ready import ready_protocol
 from tests.programs import run_program
+from tests.tables import cases
 
 ROOT = Path(__file__).parents[1]
-PROTOCOL = "protocols/inclined-uniform.yaml"
 LAST_LINE = """
 import json, sys
 print()
 print(json.dumps(sorted(sys.modules)))
-"""
-HELP = """
-import rig.cli
-try:
-    rig.cli.main(["--help"])
-except SystemExit as stop:
-    assert not stop.code
 """
 HEADLESS_RUN = """
 import sys
@@ -43,19 +34,7 @@ def packages_loaded_by(program: str, *arguments: str) -> set[str]:
     return set(json.loads(done.stdout.splitlines()[-1]))
 
 
-@pytest.mark.parametrize(
-    ("program", "absent"),
-    [
-        (HELP, "msgspec numpy scipy yaml matplotlib textual rig.commands rig.ready textwrap"),
-        (f"from rig.cli import main\nassert main(['predict', {PROTOCOL!r}]) == 0\n"
-         f"assert main(['check', {PROTOCOL!r}]) == 0", "scipy"),
-        ("import rig.link.client, rig.link.port", "numpy sim yaml rig.model"),
-        ("import rig.report.templates, rig.report.figures, rig.bundle.tables, rig.session.store",
-         "matplotlib numpy jinja2"),
-        ("from rig.board.page import BoardPage\nBoardPage('http://localhost:1/').look({})",
-         "segno matplotlib textual"),
-    ],
-)  # fmt: skip
+@cases
 def test_a_program_loads_nothing_that_it_does_not_need(program, absent):
     assert packages_loaded_by(program).isdisjoint(absent.split())
 

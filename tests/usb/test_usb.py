@@ -60,22 +60,10 @@ def test_candidates_come_first_and_the_others_say_why_not(plugged, never, call):
     assert "skipped: no board's USB numbers" in lines[3]
 
 
-def test_json_has_everything(plugged, never, call):
+@cases
+def test_json_has_everything(candidate, plugged, never, call):
     first, *rest = json.loads(call("ports", "--json").out)["ports"]
-    assert first == {
-        "path": "/dev/ttyACM3",
-        "vid": 0x2341,
-        "pid": 0x0042,
-        "serial_number": "85430",
-        "manufacturer": None,
-        "product": "Mega",
-        "kind": "Arduino Mega 2560",
-        "kinds": ["Arduino Mega 2560"],
-        "skipped": "",
-        "candidate": True,
-        "identity": None,
-        "trouble": None,
-    }
+    assert first == candidate
     assert not any(port["candidate"] for port in rest)
 
 
