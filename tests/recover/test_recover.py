@@ -3,8 +3,6 @@
 import random
 import shutil
 import sqlite3
-import subprocess
-import sys
 from contextlib import closing
 from pathlib import Path
 
@@ -16,9 +14,7 @@ from rig.recover.examine import describe, examine
 from rig.recover.save import save
 from rig.replay import replay
 from rig.session.store import Session
-from tests.session.altering import alter
-
-ROOT = Path(__file__).parents[2]
+from tests.session.altering import alter, killed
 
 
 @pytest.fixture
@@ -145,21 +141,14 @@ def test_without_its_first_pages_the_rest_is_read(size, copy, truth, tmp_path):
 
 
 WRITE = """
-import os, sys
-from rig.link.messages import Status
 from rig.records import Drop, Edge
 from rig.session.schema import RunState
-from rig.session.store import Session
-from tests.session.altering import alter
-session = Session.create(sys.argv[1], "protocol: 1", "p.yaml", simulated=False, origin="x")
 for run in range(1, 30):
     edges = tuple(Edge(1000 * n, n % 3, n % 2 == 0) for n in range(50))
     session.add_drop(Drop(run, 1, 16_000_000, edges), provenance="import")
     session.add_state(run, 1, RunState.RECORDED, run)
     session.commit()
 print("ready", flush=True)
-if sys.argv[2] == "die":
-    os._exit(9)
 sys.stdin.read()
 """
 
@@ -168,19 +157,21 @@ sys.stdin.read()
 def dead(tmp_path_factory):
     """Leave a session as a killed process does."""
     path = tmp_path_factory.mktemp("dead") / "killed.session"
-    subprocess.run([sys.executable, "-c", WRITE, path, "die"], cwd=ROOT, check=False)
+    with killed(WRITE, path) as writer:
+        assert writer.stdout.readline() == "ready\n"
     assert path.with_name("killed.session-wal").stat().st_size > 4096
     return path.parent
 
 
 @pytest.fixture
-def killed(dead, tmp_path):
+def logged(dead, tmp_path):
+    """Give a session of which all is in the log beside it, and the log."""
     shutil.copytree(dead, tmp_path, dirs_exist_ok=True)
     return tmp_path / "killed.session", tmp_path / "killed.session-wal"
 
 
-def test_what_is_in_the_log_only_is_read_and_left_there(killed):
-    path, log = killed
+def test_what_is_in_the_log_only_is_read_and_left_there(logged):
+    path, log = logged
     before = path.read_bytes(), log.read_bytes()
     found = examine(path)
     assert found.whole
@@ -189,8 +180,8 @@ def test_what_is_in_the_log_only_is_read_and_left_there(killed):
     assert (path.read_bytes(), log.read_bytes()) == before
 
 
-def test_without_its_log_a_session_is_poorer_and_says_what_to_look_for(killed):
-    path, log = killed
+def test_without_its_log_a_session_is_poorer_and_says_what_to_look_for(logged):
+    path, log = logged
     log.unlink()
     found = examine(path)
     assert found.whole
@@ -199,8 +190,8 @@ def test_without_its_log_a_session_is_poorer_and_says_what_to_look_for(killed):
 
 
 @pytest.mark.parametrize("part", [0.1, 0.4, 0.77, 0.99])
-def test_a_torn_log_counts_up_to_its_last_whole_commit(part, killed):
-    path, log = killed
+def test_a_torn_log_counts_up_to_its_last_whole_commit(part, logged):
+    path, log = logged
     log.write_bytes(log.read_bytes()[: round(log.stat().st_size * part)])
     found = examine(path)
     assert not found.foreign
@@ -210,8 +201,8 @@ def test_a_torn_log_counts_up_to_its_last_whole_commit(part, killed):
         assert connection.execute('SELECT count(*) FROM "drop"').fetchone() == (len(runs),)
 
 
-def test_a_damaged_log_counts_up_to_the_damage(killed):
-    path, log = killed
+def test_a_damaged_log_counts_up_to_the_damage(logged):
+    path, log = logged
     data = bytearray(log.read_bytes())
     data[len(data) // 2] ^= 1
     log.write_bytes(data)
@@ -220,20 +211,18 @@ def test_a_damaged_log_counts_up_to_the_damage(killed):
     assert (path.read_bytes(), log.read_bytes()) == before
 
 
-def test_a_log_is_read_though_the_files_first_page_is_lost(killed):
-    path, _ = killed
+def test_a_log_is_read_though_the_files_first_page_is_lost(logged):
+    path, _ = logged
     path.write_bytes(bytes(4096) + path.read_bytes()[4096:])
     assert [one.drop.run for one in examine(path).drops] == list(range(1, 30))
 
 
 def test_a_session_that_is_being_written(tmp_path):
     path = tmp_path / "live.session"
-    command = [sys.executable, "-c", WRITE, path, "wait"]
-    with subprocess.Popen(command, cwd=ROOT, stdin=-1, stdout=-1, text=True) as writer:
+    with killed(WRITE, path) as writer:
         assert writer.stdout.readline() == "ready\n"
         found = examine(path)
         said = describe(found)
-        writer.stdin.close()
     assert found.whole
     assert len(found.drops) == 29
     assert any(f"being written by process {writer.pid}" in line for line in said)

@@ -1,8 +1,13 @@
-"""Altering a session behind its back, as somebody would who takes its guards away for a moment."""
+"""Sessions that come to harm: altered behind their back, outdated, their writer killed."""
 
+import os
 import sqlite3
+import subprocess
+import sys
 from contextlib import closing, contextmanager
+from pathlib import Path
 
+import rig
 from rig.session.schema import TABLES
 
 LATER = {  # columns and tables that formats after the first have added
@@ -44,3 +49,21 @@ def outdate(session, version):
             connection.execute(sql)
         connection.execute(f"PRAGMA user_version = {version}")
         connection.execute("VACUUM")
+
+
+_OPEN = """
+import sys
+from rig.session.store import Session
+session = Session.create(sys.argv[1], "p", "p", simulated=True, origin="sim://")
+"""
+
+
+@contextmanager
+def killed(code, path):
+    """Run a program that writes a session; kill it behind the block."""
+    environment = {**os.environ, "PYTHONPATH": str(Path(rig.__file__).parents[1])}
+    command = [sys.executable, "-c", _OPEN + code, path]
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, env=environment, **pipes) as child:
+        yield child
+        child.kill()

@@ -4,15 +4,12 @@ import os
 import random
 import shutil
 import sqlite3
-import subprocess
-import sys
-from contextlib import closing, contextmanager
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-import rig
 from rig.errors import SessionError
 from rig.reasons import make_reason, plain_reason
 from rig.records import Certificate, ClockSample, Drop, Edge, HostBreak, Pulse
@@ -22,7 +19,7 @@ from rig.session.hashes import protocol_first
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, TABLES, RunState
 from rig.session.store import Session
 from tests.refusals import refused
-from tests.session.altering import LATER, alter, outdate
+from tests.session.altering import LATER, alter, killed, outdate
 from tests.tables import cases
 
 TEXT = "protocol: 1\ntitle: Übung\n"
@@ -71,24 +68,6 @@ def fill(session):
     session.add_state(2, 0, RunState.PLANNED, 1)
     session.add_state(2, 1, RunState.VOID, 2, [plain_reason("skew 7 ms"), plain_reason("β ≠ 0.5")])
     session.attach("rig µ.jpg", b"\xff\xd8")
-
-
-@contextmanager
-def killed(code, path):
-    """Run a program that writes a session; kill it behind the block."""
-    environment = {**os.environ, "PYTHONPATH": str(Path(rig.__file__).parents[1])}
-    command = [sys.executable, "-c", _OPEN + code, path]
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-    with subprocess.Popen(command, env=environment, **pipes) as child:
-        yield child
-        child.kill()
-
-
-_OPEN = """
-import sys
-from rig.session.store import Session
-session = Session.create(sys.argv[1], "p", "p", simulated=True, origin="sim://")
-"""
 
 
 def test_everything_comes_back_as_it_went_in(path):
