@@ -8,6 +8,8 @@ end.
 
 import shutil
 from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -92,6 +94,14 @@ def explored(steps, depth, folder, monkeypatch, begin=()):
     return found
 
 
+@pytest.fixture
+def folder():
+    """Name a folder in memory, where there is any: hundreds of rigs are made in it."""
+    memory = Path("/dev/shm")
+    with TemporaryDirectory(dir=memory if memory.is_dir() else None) as temporary:
+        yield Path(temporary) / "rig"
+
+
 FALLEN = (("arm", None), ("fire_latest", Trouble("killed", "written", 2)))
 
 
@@ -99,16 +109,16 @@ FALLEN = (("arm", None), ("fire_latest", Trouble("killed", "written", 2)))
     ("before", "action"), [((), "arm"), ((("arm", None),), "fire_latest"), (FALLEN, "resume")]
 )
 def test_whatever_goes_wrong_at_any_moment_of_a_drop_it_ends_well(
-    before, action, tmp_path, monkeypatch
+    before, action, folder, monkeypatch
 ):
     steps = [step for step in TROUBLES if step[0] == action]
-    found = explored(steps, 1, tmp_path / "rig", monkeypatch, before)
+    found = explored(steps, 1, folder, monkeypatch, before)
     # So that it cannot become a test of nothing.
     assert {path[-1][1].what for path in found.values() if path != before}
 
 
-def test_nothing_falls_unarmed_is_lost_or_waits_for_ever(tmp_path, monkeypatch):
-    found = explored(ACTIONS, 3, tmp_path / "rig", monkeypatch)
+def test_nothing_falls_unarmed_is_lost_or_waits_for_ever(folder, monkeypatch):
+    found = explored(ACTIONS, 3, folder, monkeypatch)
     assert any(path[-1:] == (("accept", None),) for path in found.values())
 
 
@@ -228,7 +238,7 @@ def test_stop_ends_the_search_for_a_board_that_does_not_answer(box):
 
 
 @pytest.mark.slow
-def test_whatever_goes_wrong_in_any_state_it_ends_well(tmp_path, monkeypatch):
-    found = explored([*ACTIONS, *TROUBLES], 3, tmp_path / "rig", monkeypatch)
+def test_whatever_goes_wrong_in_any_state_it_ends_well(folder, monkeypatch):
+    found = explored([*ACTIONS, *TROUBLES], 3, folder, monkeypatch)
     struck = {step[1].what for path in found.values() for step in path if step[1]}
     assert struck == {trouble.what for _, trouble in TROUBLES}
