@@ -22,16 +22,8 @@ PAGES = [
 CHOICE = (ROOT / "rig/commands/choose.txt").read_text("utf-8")
 NOT_RUN = read_table(__file__, "not_run")
 """Parts of commands that no test runs as printed, and why."""
-CHAINS = "rig new my-chains.yaml --scene two-chains --repeats 4 --yes"
-DROPS = "rig run my-chains.yaml --port sim:// --session my.session --yes"
-BEFORE = {
-    "accuracy.md": [CHAINS],
-    "daemon.md": [CHAINS, "echo 'blind: true' >> my-chains.yaml", DROPS],
-    "one-object.md": ["seq 0 20 | awk 'BEGIN {print \"t,x,y\"} {t = $1/60; y = -4.905*t*t; "
-                      "print t \",0,\" y}' > track.txt"],
-    "timers.md": [CHAINS, DROPS, "rig export my.session --csv csv", "mv csv/edges.csv logger.txt",
-                  "rm my.session*"],
-}  # fmt: skip
+BEFORE = read_table(__file__, "done_before")
+CHAINS, DROPS, *_ = BEFORE["timers.md"]
 """What the reader of a page has done before."""
 
 

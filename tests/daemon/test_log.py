@@ -10,6 +10,7 @@ from rig.errors import RigError
 from rig.recorder.published import PublishedState
 from tests.daemon.at_work import ended
 from tests.refusals import refused
+from tests.tables import read_table
 from tests.waiting import PATIENCE_S
 
 
@@ -35,22 +36,11 @@ def test_a_session_and_a_pulled_cable_are_told_once_each():
     down = [line for line in told if line.startswith("down: ")]
     assert down
     assert len(set(down)) == len(down)
-    up = r"up: .+, id [0-9a-f]{16}"
-    expected = [
-        up,
-        "in control: the driver",
-        f"session: {processes.session}",
-        r"run 1, attempt 1: recorded, \d+ edges",
-        "run 2, attempt 1: interrupted: enough",
-        up,
-        f"closed: {processes.session}",
-        "in control: nobody",
-        "rig daemon: ended",
-    ]
+    expected = read_table(__file__, "log")
     others = [line for line in told if line not in down]
     assert len(others) == len(expected), others
     for line, pattern in zip(others, expected, strict=True):
-        assert re.fullmatch(pattern, line), others
+        assert re.fullmatch(pattern.replace("SESSION", str(processes.session)), line), others
 
 
 def test_a_fault_of_the_program_is_logged_with_its_traceback_once(caplog):

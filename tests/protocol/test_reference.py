@@ -17,7 +17,7 @@ from rig.protocol.reader import parse
 from rig.protocol.reference import page, schema
 from rig.protocol.yamltree import load
 from tests.protocol.keys import around, put, value
-from tests.tables import cases
+from tests.tables import cases, read_table
 
 ROOT = Path(__file__).parents[2]
 READY = sorted((ROOT / "protocols").glob("*.yaml"))
@@ -48,14 +48,7 @@ def test_an_example_is_read_as_it_stands(key):
     VALIDATOR.validate(data)
 
 
-IN_WORDS = {
-    "title": "the file's name",
-    "chains.*.rods.[].diameter": "the chain's",
-    "chains.*.rods.[].mass": "the chain's",
-    "chains.*.mass": "as the cross-sections",
-    "chains.*.alpha": "by Eqs. 8, 9 and 12",
-    "chains.*.gamma": "by Eq. 10, or 0 where alpha is given",
-}
+IN_WORDS = read_table(__file__, "in_words")
 """Defaults that follow from something else."""
 
 
