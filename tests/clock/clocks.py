@@ -21,17 +21,12 @@ def tick_rate(pings, nominal_hz, cuts_ns=()) -> TickRate:
     return ping_rate(epochs(samples(pings), nominal_hz, cuts_ns))
 
 
-def exponential(mean: float = 1e-3) -> Delay:
-    return lambda rng: rng.expovariate(1.0 / mean)
-
-
-def heavy(mean: float = 1e-3) -> Delay:
-    """Pareto with an infinite variance: now and then a hundred times the mean."""
-    return lambda rng: mean * 0.5 * (rng.paretovariate(1.5) - 1.0)
-
-
-def stalled(share: float = 0.05, stall: float = 0.05) -> Delay:
-    return lambda rng: rng.expovariate(1e3) + (stall if rng.random() < share else 0.0)
+DELAYS: dict[str, Delay] = {
+    "exponential": lambda rng: rng.expovariate(1e3),
+    # Pareto with an infinite variance: now and then a hundred times the mean.
+    "heavy": lambda rng: 0.5e-3 * (rng.paretovariate(1.5) - 1.0),
+    "stalls": lambda rng: rng.expovariate(1e3) + 0.05 * (rng.random() < 0.05),
+}
 
 
 class Clock:
@@ -72,7 +67,7 @@ def compared(
 ) -> list[ClockSample]:
     """Pings at uneven distances, delayed on both ways."""
     rng = random.Random(seed)
-    wait = delay or exponential()
+    wait = delay or DELAYS["exponential"]
     found, at = [], begin
     while at < begin + span:
         there = at + TRIP_S / 2 + wait(rng) * 0.3

@@ -8,17 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.clock.wander import Readings, Track
-from tests.clock.clocks import (
-    HZ,
-    Clock,
-    compared,
-    exponential,
-    heavy,
-    moved,
-    ppm,
-    stalled,
-    tick_rate,
-)
+from tests.clock.clocks import DELAYS, HZ, Clock, compared, moved, ppm, tick_rate
 from tests.examples import examples
 
 TRIALS = 120
@@ -36,9 +26,7 @@ def errors(delay, trials=TRIALS, span=60.0, **clock):
     return np.array(found).T
 
 
-@pytest.mark.parametrize(
-    "delay", [exponential(), heavy(), stalled()], ids=["exponential", "heavy", "stalls"]
-)
+@pytest.mark.parametrize("delay", DELAYS.values(), ids=DELAYS)
 def test_after_a_minute_the_rate_is_known_to_5_ppm_and_its_uncertainty_is_true(delay):
     error, u, _ = errors(delay)
     assert np.abs(error).max() <= 5.0
