@@ -5,7 +5,7 @@ import pytest
 from rig.link import messages as wire
 from rig.link.client import Device
 from tests.firmware.core_board import BROWN_OUT, CoreBoard
-from tests.link.bench import LABEL, Bench, ScriptedLab, falling_rods
+from tests.link.bench import LABEL, Bench
 from tests.link.conformance import DeviceConformance
 from tests.link.talk import Wire, arm
 
@@ -55,13 +55,3 @@ class TestCore(DeviceConformance):
 class TestStreamingCore(DeviceConformance):
     def make(self, lab):
         return CoreBench(lab, CoreBoard(lab, streams=True))
-
-
-def test_each_begins_anew_whatever_another_did():
-    """Its random numbers too, which come of all that it was ever asked."""
-
-    def spoken() -> list[object]:
-        line = Wire(CoreBench(lab := ScriptedLab(changes=falling_rods()), CoreBoard(lab)))
-        return [line.ask(wire.Identify(), 1), line.drop(), line.ask(wire.Status(), 9)]
-
-    assert spoken() == spoken()
