@@ -53,7 +53,10 @@ def installed(tmp_path_factory):
     python = environment / "bin/python"
     subprocess.run([*pip, "--python", python, "install", "-q", "--no-deps", wheel], check=True)
     paths = sysconfig.get_paths(vars={"base": str(environment), "platbase": str(environment)})
-    (Path(paths["purelib"]) / "others.pth").write_text(f"{sysconfig.get_paths()['purelib']}\n")
+    packages = Path(paths["purelib"])
+    (packages / "others.pth").write_text(f"{sysconfig.get_paths()['purelib']}\n")
+    assert not (packages / "sim").exists(), "this name is left to others, who may have it"
+    (packages / "sim.py").write_text("raise SystemExit('this is another package')\n")
     return environment
 
 
