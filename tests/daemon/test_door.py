@@ -70,7 +70,7 @@ def test_it_stays_for_the_clients_that_it_has(processes):
     client = processes.client()
     until(lambda: client.call("subscribe")["state"]["link"]["state"] == "up")
     delete(processes.socket)
-    time.sleep(1.0)  # it looks ten times a second
+    time.sleep(0.5)  # it looks ten times a second
     lease = client.call("subscribe")["state"]["daemon"]
     assert client.call("renew") == {"disk_s": 0.0}
     assert lease["pid"] == processes.daemon.pid

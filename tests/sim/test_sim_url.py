@@ -1,9 +1,9 @@
 """``sim://`` as the rest of the program meets it: a port by URL, its line, a device, drops."""
 
 import json
-from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -18,23 +18,20 @@ CHAINS = PROTOCOLS / "inclined-uniform.yaml"
 sim_url = partial(url, "sim")
 
 
-@dataclass
-class Talk:
+class Talk(NamedTuple):
     """A conversation: all bytes with their times, and what came of it."""
 
-    chunks: list[tuple] = field(default_factory=list)
-    drops: list[Drop] = field(default_factory=list)
-    pings: list[ClockSample] = field(default_factory=list)
+    chunks: list[tuple]
+    drops: list[Drop]
+    pings: list[ClockSample]
 
 
 def talk(where: str, gates: int = 0b11, runs=((1, 1),), pings: int = 3) -> Talk:
-    done = Talk()
+    done = Talk([], [], [])
     port, device = connected(where, lambda *chunk: done.chunks.append(chunk))
     for i in range(pings):
         port.clock.sleep(0.1 + 0.037 * (i % 7))
-        ping = device.ping()
-        if ping is not None:
-            done.pings.append(ping)
+        done.pings.append(device.ping())
     for run, attempt in runs:
         order = {"gates": gates, "pulse_us": 80_000, "record_ms": 900}
         done.drops.append(record_drop(device, pack_label(run, attempt), **order))
