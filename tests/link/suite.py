@@ -71,8 +71,9 @@ class Suite:
         return device
 
     def restart(self, bench: Bench, device: Device) -> None:
-        """Press reset, and see that the device says so."""
+        """Press reset, and see that the device says so and is who it was."""
+        identity = device.transcript.identity
         bench.reset()
         with pytest.raises(DeviceError, match="restarted"):
             self.heard(bench, device, 3.0)
-        device.connect(boot_wait_s=0)
+        assert device.connect(boot_wait_s=0) == identity

@@ -32,10 +32,6 @@ class HoldSuite(Suite):
 
     # -- resets
 
-    def test_a_reset_is_announced(self, bench, device, identity):
-        self.restart(bench, device)
-        assert device.transcript.identity == identity
-
     def test_a_reset_disarms(self, bench, device):
         token = arm(device)
         self.restart(bench, device)
