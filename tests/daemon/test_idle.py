@@ -46,13 +46,15 @@ def client(processes):
         one.close()
 
 
-def test_it_stays_while_a_client_is_there_and_ends_after_it(processes, client):
-    one = client("one")
+def test_it_stays_while_a_client_is_there_and_disarms_before_it_ends(processes, driver):
     time.sleep(3 * IDLE_S)
-    assert one.call("renew") == {"disk_s": 0.0}
-    one.close()
+    assert driver.call("renew") == {"disk_s": 0.0}
+    driver.arm(1, 1)
+    driver.close()
     assert ALONE in ended(processes)
     assert not processes.socket.exists()
+    processes.await_phase(Phase.IDLE)
+    assert states(processes) == [(1, 1, "armed"), (1, 1, "interrupted")]
 
 
 def test_one_that_was_started_by_hand_stays(tmp_path):
@@ -63,14 +65,6 @@ def test_one_that_was_started_by_hand_stays(tmp_path):
         other = run_program(sys.executable, *words, place)
         assert ALONE in other.stderr
         processes.client().close()
-
-
-def test_what_was_armed_is_disarmed_before_it_ends(processes, driver):
-    driver.arm(1, 1)
-    driver.close()
-    ended(processes)
-    processes.await_phase(Phase.IDLE)
-    assert states(processes) == [(1, 1, "armed"), (1, 1, "interrupted")]
 
 
 def test_a_drop_that_only_the_board_has_is_waited_for(processes, driver):

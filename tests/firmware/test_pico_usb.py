@@ -1,5 +1,7 @@
 """The Pico's USB on bad days: a host that loses, gives up, sleeps; a controller that hangs."""
 
+from itertools import product
+
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
@@ -64,23 +66,24 @@ def test_what_the_host_loses_or_gives_up_changes_nothing(stand, hostile):
     assert chip.usb["late"] == 0
 
 
-@pytest.mark.parametrize("clears", ["clear_halts", "set_interface"])
-@pytest.mark.parametrize("pings", [1, 2])
-def test_both_sides_count_packets_from_the_beginning(stand, clears, pings):
-    for _ in range(pings):  # an odd and an even number of packets before
-        stand.ask(wire.Ping())
-    stand.avr.reads(False)  # and then one that waits to be taken
-    stand.send(wire.Status())
-    stand.hear(MS)
-    getattr(stand.avr, clears)()
-    stand.hear(2 * MS)
-    stand.avr.reads(True)
-    assert [type(message) for message in stand.hear(MS)] == [wire.State]
-    for _ in range(3):
-        assert isinstance(stand.ask(wire.Ping()), wire.Pong)
+def test_both_sides_count_packets_from_the_beginning(stand):
+    for pings, clear in product((1, 2), (stand.avr.clear_halts, stand.avr.set_interface)):
+        clear()
+        stand.hear(2 * MS)
+        for _ in range(pings):  # an odd and an even number of packets before
+            stand.ask(wire.Ping())
+        stand.avr.reads(False)  # and then one that waits to be taken
+        stand.send(wire.Status())
+        stand.hear(MS)
+        clear()
+        stand.hear(2 * MS)
+        stand.avr.reads(True)
+        assert [type(message) for message in stand.hear(MS)] == [wire.State]
+        for _ in range(3):
+            assert isinstance(stand.ask(wire.Ping()), wire.Pong)
 
 
-def test_a_bus_that_sleeps_is_left_alone(stand):
+def test_neither_a_bus_that_sleeps_nor_a_controller_that_is_dead_stops_the_board(stand):
     stand.avr.sleep_bus(True)
     stand.hear(200 * MS)
     stand.avr.sleep_bus(False)
@@ -90,10 +93,7 @@ def test_a_bus_that_sleeps_is_left_alone(stand):
     stand.avr.hang_usb()  # and it is watched again
     stand.hear(300 * MS)
     assert stand.avr.usb["plugs"] == 2
-
-
-def test_a_controller_that_stays_dead_does_not_stop_the_board(stand):
-    stand.avr.hang_usb(dead_s=1.0)
+    stand.avr.hang_usb(dead_s=1.0)  # a controller that stays dead does not stop the board
     stand.hear(900 * MS)
     assert (stand.avr.usb["ready"], stand.avr.watchdog_resets) == (0, 0)
     stand.hear(400 * MS)
