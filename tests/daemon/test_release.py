@@ -56,7 +56,7 @@ def test_it_is_driven_for_the_protocols_pulse_and_is_no_run(processes, driver):
         assert "DIFFERENT" not in replay(session).lines[0]
 
 
-def test_it_needs_control_a_session_and_nothing_armed(processes, client):
+def test_it_needs_control_a_session_nothing_armed_and_a_closed_emergency_stop(processes, client):
     one, other = client("one"), client("other")
     one.take_control()
     refused(InputError, "not the moment", one.call, "test_release")
@@ -65,14 +65,9 @@ def test_it_needs_control_a_session_and_nothing_armed(processes, client):
         other.call("test_release")
     one.arm(1, 1)
     refused(InputError, "not the moment", one.call, "test_release")
-    assert not driven(processes)
-
-
-def test_an_open_emergency_stop_refuses_it(processes, driver):
-    driver.arm(1, 1)
     processes.hand("stop 1")
-    until(lambda: driver.session.latest_state(1).state is RunState.INTERRUPTED)
-    error = refused(DeviceRefusedError, "", driver.call, "test_release")
+    until(lambda: one.session.latest_state(1).state is RunState.INTERRUPTED)
+    error = refused(DeviceRefusedError, "", one.call, "test_release")
     assert error.reason is RefusalReason.STOPPED
     assert not driven(processes)
 
