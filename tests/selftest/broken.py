@@ -39,14 +39,21 @@ def wrong(phase, request, when=lambda self, asked: True):
     return odd(answer=reply)
 
 
+def answers(method, kind, **changes):
+    """Change fields of one method's answers of a kind, each by a function of what it was."""
+
+    def answer(_, usual, *args):
+        right = usual(*args)
+        if not isinstance(right, kind):
+            return right
+        return replace(right, **{name: new(getattr(right, name)) for name, new in changes.items()})
+
+    return odd(**{method: answer})
+
+
 def claims(name, change):
     """Answer STATUS with one field changed."""
-
-    def status(_, usual):
-        state = usual()
-        return replace(state, **{name: change(getattr(state, name))})
-
-    return odd(_status=status)
+    return answers("_status", wire.State, **{name: change})
 
 
 def keeping(method, *names):
@@ -92,14 +99,8 @@ def disobeys(request):
 
 
 def identified(**fields):
-    """Build a board with another identity."""
-
-    def build():
-        board = LoopedBoard(Wire())
-        board.identity = replace(board.identity, **fields)
-        return board
-
-    return build
+    """Say to be another."""
+    return answers("_identify", wire.Identity, **{n: lambda _, v=v: v for n, v in fields.items()})
 
 
 def bouncing():
@@ -118,17 +119,6 @@ def refusal_disarms(self, usual, order):
 def never_cools(self, usual, order):
     self.release._off_ns = 0
     return usual(order)
-
-
-def rests(change):
-    """Say another time that a release has to rest."""
-
-    def arm(_, usual, order):
-        answer = usual(order)
-        is_cooling = isinstance(answer, wire.Refused) and answer.reason is RefusalReason.COOLING
-        return replace(answer, detail=change(answer.detail)) if is_cooling else answer
-
-    return odd(_arm=arm)
 
 
 def one_token(self, usual, order):
@@ -160,11 +150,6 @@ def has_wrong_sum(self, asked):
     return asked.crc32 != self.drop.certificate().crc32
 
 
-def certifies_anew(_, usual, request):
-    answer = usual(request)
-    return replace(answer, glitches=9) if isinstance(answer, wire.DropCertificate) else answer
-
-
 def wrong_certificate(name, change):
     """Certify drops with one field changed."""
 
@@ -191,12 +176,6 @@ def listens_when_clean(self, usual):
     return self._inbox.popleft() if self._decoder.bad else usual()
 
 
-def takes_ids(_, usual, request):
-    answer = usual(request)
-    fresh = next(COUNT).to_bytes(8, "big")
-    return replace(answer, unique_id=fresh) if isinstance(answer, wire.Identity) else answer
-
-
 def late_answers(_, usual, at_ns, data):
     usual(at_ns + 150_000_000, data)
 
@@ -207,7 +186,11 @@ BROKEN = [
     ("handshake", ODD, identified(channels="A B C")),
     ("handshake", ODD, identified(unique_id=bytes(8))),
     ("handshake", ODD, identified(tick_hz=999_999)),
-    ("handshake", ODD, odd(_identify=takes_ids)),
+    (
+        "handshake",
+        ODD,
+        answers("_identify", wire.Identity, unique_id=lambda _: next(COUNT).to_bytes(8, "big")),
+    ),
     ("bad requests", ODD, odd(_identify=lambda self, *_: self._identity)),
     ("bad requests", ODD, odd(answer=agrees)),
     ("bad requests", ODD, odd(answer=any_length)),
@@ -260,12 +243,12 @@ BROKEN = [
         wrong(Phase.HOLDING, wire.Arm, lambda me, asked: asked.label == LABEL and me.drop.aborted),
     ),
     ("HOLDING", ODD, wrong(Phase.HOLDING, wire.Read, lambda _, asked: asked.count)),
-    ("HOLDING", ODD, odd(_read=certifies_anew)),
+    ("HOLDING", ODD, answers("_read", wire.DropCertificate, glitches=lambda _: 9)),
     ("HOLDING", ODD, wrong(Phase.HOLDING, wire.Status)),
     ("HOLDING", ODD, wrong(Phase.HOLDING, wire.Acknowledge, has_wrong_sum)),
     ("COOLING", ODD, odd(_arm=never_cools)),
-    ("COOLING", ODD, rests(lambda _: 10_000)),
-    ("COOLING", ODD, rests(lambda rest_ms: rest_ms // 2)),
+    ("COOLING", ODD, answers("_arm", wire.Refused, detail=lambda _: 10_000)),
+    ("COOLING", ODD, answers("_arm", wire.Refused, detail=lambda rest_ms: rest_ms // 2)),
     ("sync output to gate", "sync_late", lambda: LoopedBoard(Wire(late_s=20e-6))),
     ("sync output to gate", "sync_edges", bouncing),
     ("sync output to gate", "sync_blocked", claims("gates", lambda gates: gates | 1 << GATE)),
