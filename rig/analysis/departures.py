@@ -32,7 +32,7 @@ from rig.analysis.chain_records import ChainRecord
 from rig.analysis.trajectory import Trajectory, free_trajectory, struck_trajectory
 from rig.arrays import Array, Index
 from rig.model.chain import Chain
-from rig.protocol.protocol import Protocol
+from rig.protocol.protocol import Contact, Protocol
 
 LOWEST_START = 1e-3
 """Least drop height of a striking chain, m: a trial step may go below the surface."""
@@ -209,17 +209,24 @@ def drawn(lever: Array, protocol: Protocol, levels: Array) -> Array:
     return lever * np.maximum(protocol.drop.value - levels, 0.0) / protocol.gravity.value
 
 
-def strike_shifts(record: ChainRecord, protocol: Protocol) -> Array:
-    """Return how much lower each rod strikes an inclined board because of its sideways motion, m.
+def strike_u(record: ChainRecord, protocol: Protocol) -> Array:
+    """Return the standard uncertainty of each rod's strike height, m.
 
-    For a bottom rod released down the slope with the prior standard deviation of its speed, and a
-    top rod at rest. A vertical board sets no limit, but no rod strikes lower than it fell.
+    A rod may strike the previous rod, which may be thicker than stated; the top rod only if its
+    strike is not stated. On an inclined board a rod strikes lower if it moves sideways: a bottom
+    rod released down the slope with the prior standard deviation of its speed, and a top rod at
+    rest. A vertical board sets no limit, but no rod strikes lower than it fell.
     """
-    chain = record.chain.chain
-    share = (chain.heights[-1] - np.array(chain.heights)) / chain.length
+    chain, stated = record.chain.chain, protocol.contact.strike
+    u = np.full(chain.rods, stated.u)
+    if record.chain.diameters and stated.u:
+        upper = slice(1, None if stated == Contact().strike else -1)
+        u[upper] = np.maximum(stated.u, record.chain.diameters)[: u[upper].size]
+    share = (chain.heights[-1] - np.array(chain.heights)) / (chain.length or 1.0)
     fallen = np.maximum(protocol.drop.value + record.strikes, 0.0)
     carried = protocol.priors.swing * share * np.sqrt(2.0 * fallen / protocol.gravity.value)
-    return np.minimum(carried * math.tan(math.radians(record.incline_deg)), fallen)
+    lower = np.minimum(carried * math.tan(math.radians(record.incline_deg)), fallen)
+    return np.hypot(u, lower)
 
 
 def swing_sd(chain: Chain, protocol: Protocol) -> float:

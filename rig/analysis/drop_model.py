@@ -15,8 +15,8 @@ from rig.analysis import annealing
 from rig.analysis.annealing import PART, Pairing, SideFall, matched
 from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import SHARPEST, Components, priors
-from rig.analysis.departures import LOWEST_START, STRETCHES, Discrepancy
-from rig.analysis.equations import STRAY, Equations, ExpectedEdges, Residuals, Seen
+from rig.analysis.departures import LOWEST_START, Discrepancy
+from rig.analysis.equations import SHARED, STRAY, Equations, ExpectedEdges, Residuals, Seen
 from rig.analysis.trajectory import (
     COMMON,
     DRAG,
@@ -241,11 +241,6 @@ class DropModel:
             release, start, gravity, gains, record.ratios, places, kappa, record.air
         )
 
-    def stretch(self, x: Array) -> Array:
-        """Return the amplitude of each stretch mode, m."""
-        own, usual = (x[self.unknowns[name]] for name in STRETCHES)
-        return own + usual
-
     def all_levels(self, role: str, x: Array) -> Array:
         """Return the height of the reference point at every expected edge of a side, m."""
         return _levels_at(self, role, x.tobytes(), x.shape)
@@ -296,7 +291,7 @@ class DropModel:
         """Return the standard deviation of each edge's height, m."""
         scales = self.components
         variance = scales.floor**2 + speed**2 * (scales.jitter**2 + seen.burst**2)
-        variance += (scales.landed * np.where(seen.alone, 0.0, seen.landed)) ** 2
+        variance += (1.0 - SHARED) * (scales.landed * seen.landed) ** 2
         sigma: Array = np.sqrt(variance + scales.departures(loose))
         return sigma
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from rig.analysis.chain_records import ChainRecord
-from rig.analysis.departures import drawn, lever, strike_shifts
+from rig.analysis.departures import drawn, lever, strike_u
 from rig.analysis.square_root import EquationRows
 from rig.arrays import Array, Flags, Index
 from rig.protocol.protocol import Protocol
@@ -24,6 +24,9 @@ HUBER = 4.0
 """Standard deviations beyond which an edge is given less weight."""
 STRAY = 6.0
 """Standard deviations beyond which an edge belongs to no rod after the fit."""
+SHARED = 0.5
+"""Share of the variance of an early strike that a rod's edges have in common; the rest is each
+edge's own."""
 SLOWED = 0.5
 """Largest share of its speed that a rod loses when one end strikes: a uniform rod that turns
 about its middle and rebounds elastically (Eq. 5 with β = 1 and ξ = ⅓)."""
@@ -129,20 +132,11 @@ class ExpectedEdges(NamedTuple):
         expected = [train.rods.size for train in trains]
         rods = np.concatenate([train.rods for train in trains])
         levels = np.concatenate([train.levels for train in trains])
-        last_falling = rods == strikes.size - 1
-        last_falling &= levels < (
-            -strikes[-2] if record.ratios is not None and strikes.size > 1 else -np.inf
-        )
-        u = np.full(rods.size, protocol.contact.strike.u)
-        if record.chain.diameters and protocol.contact.strike.u:
-            # Rods below the top rod may strike the previous rod, which may be thicker.
-            before = np.append(0.0, record.chain.diameters[:-1])[rods]
-            u = np.where(rods < strikes.size - 1, np.maximum(u, before), u)
-        to_strike = np.full(rods.size, np.inf)  # distance of each rod to its strike, m
-        if record.ratios is not None:
-            if strikes.size > 1:
-                u = np.hypot(u, strike_shifts(record, protocol)[rods])
+        alone, landed = np.zeros(rods.size, dtype=np.bool_), np.zeros(rods.size)
+        if record.ratios is not None and strikes.size > 1:
+            alone = (rods == strikes.size - 1) & (levels < -strikes[-2])
             to_strike = levels + strikes[rods] - protocol.contact.strike.value
+            landed = _landing_sd(strike_u(record, protocol)[rods], to_strike)
         return cls(
             rods,
             np.repeat([train.gate for train in trains], expected),
@@ -150,8 +144,8 @@ class ExpectedEdges(NamedTuple):
             np.where(np.concatenate([train.blocks for train in trains]), -0.5, 0.5),
             np.where(rods % 2, -1.0, 1.0),
             drawn(lever(record.chain.chain)[rods], protocol, levels),
-            last_falling,
-            _landing_sd(u, to_strike),
+            alone,
+            landed,
         )
 
     def seen(self, pick: Index, times: Array, burst: Array) -> Seen:
@@ -159,18 +153,15 @@ class ExpectedEdges(NamedTuple):
         paired = np.zeros(pick.size, dtype=np.bool_)
         rods, gate = self.rods[pick], self.gate[pick]
         paired[:-1] = (rods[1:] == rods[:-1]) & (gate[1:] == gate[:-1])
-        last_falling, landed = self.alone[pick], self.landed[pick]
-        return Seen(pick, times, burst, last_falling, landed, paired)
+        return Seen(pick, times, burst, self.alone[pick], self.landed[pick], paired)
 
 
 def _landing_sd(u: Array, to_strike: Array) -> Array:
     """Return `ExpectedEdges.landed` for normally distributed strikes, which slow their rods."""
-    sd = np.zeros_like(to_strike)
-    for place in np.flatnonzero(np.isfinite(to_strike) & (u > 0.0)):
-        z = float(to_strike[place] / u[place])
-        beyond = 0.5 * math.erfc(z / math.sqrt(2.0))
-        square = (1.0 + z * z) * beyond - z * math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
-        sd[place] = SLOWED * u[place] * math.sqrt(max(square, 0.0))
+    z = np.divide(to_strike, u, out=np.zeros_like(u), where=u > 0.0)
+    beyond = 0.5 * np.vectorize(math.erfc)(z / math.sqrt(2.0))
+    square = (1.0 + z * z) * beyond - z * np.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
+    sd: Array = SLOWED * u * np.sqrt(np.maximum(square, 0.0))
     return sd
 
 

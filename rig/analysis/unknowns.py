@@ -19,8 +19,8 @@ import numpy as np
 
 from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import Components, above
-from rig.analysis.departures import MODES, drawn, lags, lever, slack, swing_sd
-from rig.analysis.equations import ExpectedEdges, standardise
+from rig.analysis.departures import MODES, drawn, lags, lever, slack, strike_u, swing_sd
+from rig.analysis.equations import SHARED, ExpectedEdges, standardise
 from rig.analysis.trajectory import COMMON, DRAG, GRAVITY, RELEASE, START
 from rig.arrays import Array, Flags, Index
 from rig.predictions import air_of
@@ -236,10 +236,16 @@ def _slack(side: Side) -> Array:
     return -slack(side.record, side.protocol.drop.value, side.edges.rods, side.edges.levels)
 
 
+def _turned_sd(side: Side) -> float | None:
+    """Prior of the top rod's width in a beam: the last pull turns it by about α rad."""
+    turned = side.record.chain.widths[-1] * side.slope * side.alpha
+    return turned if side.protocol.priors.departure else None
+
+
 def _strike_sd(side: Side) -> float:
     """Prior of the strike height; the top rod may strike as high as beams not all rods pass."""
     lying = [side.gates.gates[train.gate].height for train in side.record.aside]
-    return max([side.protocol.contact.strike.u, *lying])
+    return max([float(strike_u(side.record, side.protocol)[-1]), *lying])
 
 
 def _contact(side: Side) -> Array:
@@ -259,6 +265,9 @@ _rig = partial(Unknown, shared="rig")
 _beams = partial(Unknown, shared="beams")
 _chain = partial(Unknown, of="each")
 _struck = partial(Unknown, of="impact")
+_early = partial(
+    _struck, line="contact", sd=lambda side: math.sqrt(SHARED) * side.model.components.landed
+)
 _stretch = partial(
     _struck,
     line="stretch",
@@ -393,18 +402,14 @@ TABLE = (
         level=lambda side: -side.edges.alone.astype(np.float64),
     ),
     _struck(
-        "landed",
-        "contact",
-        lambda side: side.model.components.landed,
-        level=lambda side: -side.edges.landed * side.edges.alone,
-    ),
-    _struck(
-        "lying",
-        "contact",
-        lambda side: side.model.components.landed,
-        level=lambda side: -side.edges.landed * ~side.edges.alone,
+        "turned",
+        "width",
+        _turned_sd,
+        level=lambda side: -side.edges.sign * side.edges.alone,
         absent=_all,
     ),
+    _early("landed", level=lambda side: -side.edges.landed * side.edges.alone),
+    _early("lying", level=lambda side: -side.edges.landed * ~side.edges.alone, absent=_all),
     _struck(
         "strings",
         "single impulses",

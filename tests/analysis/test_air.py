@@ -9,7 +9,7 @@ import pytest
 from bench.studies.falls import Asked, falls
 from bench.studies.time_scales import time_scale
 from rig.analysis.chain_records import chain_records
-from rig.analysis.departures import lags, strike_shifts
+from rig.analysis.departures import lags, strike_u
 from rig.analysis.drop import DropCase
 from rig.analysis.drop_model import DropModel
 from rig.analysis.dual import Dual
@@ -17,6 +17,8 @@ from rig.analysis.gravity import free_gravity
 from rig.analysis.quantities import AdjustedDrop
 from rig.analysis.session import analyze
 from rig.protocol.plan import runs as planned
+from rig.protocol.protocol import Contact
+from rig.units import Quantity
 from tests.analysis.drops import PROTOCOLS, SCENES, assert_true, case
 from tests.analysis.sessions import MILD
 
@@ -43,17 +45,17 @@ def test_a_rod_left_alone_lags_as_its_own_fall_does():
 
 
 def test_a_rod_strikes_lower_the_further_a_swing_carries_it():
-    protocol = SCENES["uniform"]
+    protocol = replace(SCENES["uniform"], contact=Contact(strike=Quantity(0.0)))
     record = record_of("uniform", "impact", 60.0)
-    lower = strike_shifts(record, protocol)
+    lower = strike_u(record, protocol)
     lasted = math.sqrt(2.0 * protocol.drop.value / protocol.gravity.value)
     carried = protocol.priors.swing * lasted
     assert lower[0] == pytest.approx(math.tan(math.radians(60.0)) * carried)
     assert lower[-1] == 0.0
-    assert not strike_shifts(replace(record, incline_deg=0.0), protocol).any()
+    assert not strike_u(replace(record, incline_deg=0.0), protocol).any()
     # Along a vertical board no rod strikes lower than it fell; one that touches it fell no way.
     thick = replace(record, incline_deg=90.0, higher=(0.2,) * record.chain.chain.rods)
-    lower = strike_shifts(thick, protocol)
+    lower = strike_u(thick, protocol)
     assert lower[0] == 0.0
     assert lower[-2] == pytest.approx(protocol.drop.value + thick.strikes[-2])
 

@@ -7,6 +7,7 @@ import pytest
 
 from rig.analysis.adjust import adjust
 from rig.analysis.drop_model import DropModel
+from rig.analysis.equations import SHARED
 from rig.analysis.quantities import measurands
 from tests.analysis.drops import GRADED, SCENES, STATED, UNIFORM, case, with_dials
 
@@ -134,7 +135,7 @@ def test_a_stamp_s_own_error_tells_nothing_of_the_clock(scene):
         scaled[at[f"{role} rods"]] += 2.0 * x[at[f"{role} rods"]]
         scaled[at[f"{role} width"]] = 2.0 * (record.chain.widths[0] + x[at[f"{role} width"]])
         powers = {"ripple": 2.0, "drag": -2.0, "contact": 2.0, "top": 2.0, f"{role} swing": 2.0}
-        powers |= dict.fromkeys(("landed", "lying", "stretch", "usual stretch"), 2.0)
+        powers |= dict.fromkeys(("landed", "lying", "stretch", "turned", "usual stretch"), 2.0)
         powers |= {f"{role} off centre": 2.0}
         for name, power in powers.items():
             if name in at:
@@ -191,7 +192,7 @@ def test_an_edge_is_as_sure_as_the_chain_is_slow():
             assert left[~last].min() == 2
             assert last.any()
         edges, seen = model.expected[role], match >= 0
-        landed = (edges.landed * ~edges.alone)[seen]
+        landed = math.sqrt(1.0 - SHARED) * edges.landed[seen]
         expected = [
             math.sqrt(STATED.floor**2 + v**2 * (STATED.jitter**2 + b**2) + d**2 + early**2)
             for v, b, d, early in zip(speed, burst, off, landed, strict=True)
