@@ -14,7 +14,7 @@ from rig.analysis.drop import DropCase
 from rig.analysis.drop_model import DropModel
 from rig.analysis.fit import match
 from rig.analysis.identify import Identification, identify
-from rig.analysis.result import DropResult
+from rig.analysis.result import Audit, DropResult, Measured, Verdict
 from rig.clock.calibration import TimeScale
 from rig.link.messages import pack_label
 from rig.model.chain import Chain
@@ -42,6 +42,11 @@ STRAY = -1
 def codes(result: DropResult) -> list[str]:
     """What a drop's reasons are."""
     return [reason.code for reason in result.reasons]
+
+
+def made_up(run: Run, verdict: Verdict = "accepted", **quantities: Measured) -> DropResult:
+    """Results of a drop that nobody let go."""
+    return DropResult(run, 1, verdict, (), Audit(660, 660), quantities)
 
 
 def with_dials(**changes: float) -> Dials:

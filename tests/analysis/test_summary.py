@@ -11,14 +11,13 @@ from hypothesis import strategies as st
 from rig.analysis.averages import combine, mean
 from rig.analysis.budget_lines import effective_degrees
 from rig.analysis.distributions import coverage_factor
-from rig.analysis.result import Audit, DropResult, Measured
+from rig.analysis.result import DropResult, Measured
 from rig.analysis.summary import summarize
 from rig.model.chain import Chain
 from rig.protocol.plan import runs
 from rig.units import Quantity
-from tests.analysis.drops import FENCE, SINGLE, UNIFORM
+from tests.analysis.drops import FENCE, SINGLE, UNIFORM, made_up
 
-AUDIT = Audit(660, 660, 0, 0, 0)
 REFERENCE = {
     40.0: (0.11546810526538031, 6.9327596650855757),
     80.0: (0.0098142050953198042, 5.25798131),
@@ -92,8 +91,8 @@ def results(protocol, values: dict[float, list[float]], verdict="accepted") -> l
     for incline, numbers in values.items():
         planned = [run for run in runs(protocol) if run.incline_deg == incline]
         for run, x in zip(planned, numbers, strict=False):
-            quantities = {"separation_m": measured(x, 1e-4), "speed_m_s": measured(50 * x, 1e-2)}
-            found.append(DropResult(run, 1, verdict, (), AUDIT, quantities))
+            both = {"separation_m": measured(x, 1e-4), "speed_m_s": measured(50 * x, 1e-2)}
+            found.append(made_up(run, verdict, **both))
     return found
 
 
@@ -164,14 +163,11 @@ def test_like_chains_make_one_result():
 
 
 def test_one_chain_is_compared_by_its_speed_a_fence_by_gravity():
-    run = runs(SINGLE)[0]
-    drop = DropResult(run, 1, "accepted", (), AUDIT, {"speed_m_s": measured(6.9, 0.01)})
+    drop = made_up(runs(SINGLE)[0], speed_m_s=measured(6.9, 0.01))
     (line,) = summarize(SINGLE, [drop])
     assert set(line.predicted) == set(line.means) == {"speed_m_s"}
     assert line.predicted["speed_m_s"].value == pytest.approx(REFERENCE[40.0][1], rel=1e-12)
-    bars = DropResult(
-        runs(FENCE)[0], 1, "accepted", (), AUDIT, {"gravity_m_s2": measured(9.8, 0.01)}
-    )
+    bars = made_up(runs(FENCE)[0], gravity_m_s2=measured(9.8, 0.01))
     (line,) = summarize(FENCE, [bars])
     assert line.predicted == {"gravity_m_s2": FENCE.gravity}
     t = 1.964719837  # of 500 degrees of freedom

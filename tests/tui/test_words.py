@@ -241,25 +241,18 @@ def test_text_from_outside_is_one_harmless_line():
     assert plain("x" * LONGEST) == "x" * LONGEST
 
 
-def test_durations():
-    assert [duration(s) for s in (3, 61, 3660)] == ["3 s", "1 min 01 s", "1 h 01 min"]
+WRITTEN = {"duration": duration, "key": shown_key, "ascii": in_ascii}
 
 
-def test_keys_are_written_as_they_stand_on_a_keyboard():
-    assert [shown_key(keys) for keys in ("f9", "ctrl+p", "x", "question_mark,f1", "enter")] == [
-        "F9", "Ctrl-P", "x", "?", "Enter"
-    ]  # fmt: skip
+@cases
+def test_it_is_written_as_people_read_it(what, value, said):
+    assert WRITTEN[what](value) == said
 
 
 @given(st.text(st.characters(exclude_categories=["M", "C"])))
 def test_every_text_keeps_its_length_and_is_ascii(text):
     assert in_ascii(text).isascii()
     assert len(in_ascii(text)) == len(text)
-
-
-def test_what_matters_can_still_be_told():
-    assert in_ascii("Δz 8.79 ± 0.02 cm at 40°") == "dz 8.79+/-0.02 cm at 40'"
-    assert in_ascii("⠉⣀⡇⣿ ") == "'.:# "
 
 
 @cases
