@@ -12,7 +12,7 @@ from rig.analysis.chain_records import ChainRecord, EdgeArrays, edge_train
 from rig.analysis.components import Components
 from rig.analysis.drop import DropCase
 from rig.analysis.drop_model import DropModel
-from rig.analysis.fit import match
+from rig.analysis.fit import Fit, match
 from rig.analysis.identify import Identification, identify
 from rig.analysis.result import Audit, DropResult, Measured, Verdict
 from rig.clock.calibration import TimeScale
@@ -62,13 +62,15 @@ class Case:
     truth: Truth
     scale: TimeScale
 
+    def read(self, explain: bool = True) -> tuple[DropResult, Fit | None]:
+        return DropCase(self.protocol, self.run, self.drop, self.scale).read(explain=explain)
+
     def analyze(self) -> DropResult:
-        return DropCase(self.protocol, self.run, self.drop, self.scale).read()[0]
+        return self.read()[0]
 
     def judge(self) -> DropResult:
         """The same, but what else would explain a void drop is not sought: that takes longest."""
-        one = DropCase(self.protocol, self.run, self.drop, self.scale)
-        return one.read(explain=False)[0]
+        return self.read(explain=False)[0]
 
     def with_edges(self, edges) -> Case:
         """The same drop with other edges; they need not be in order of time."""

@@ -65,12 +65,6 @@ def test_a_port_that_cannot_be_opened_is_device_trouble(
         assert session.states() == []
 
 
-@cases
-def test_an_empty_port_is_refused(call, words):
-    """As a variable of a shell is that nobody has set."""
-    assert "accepted: a device path, or a URL" in call(*words, "--port", "", code=2).err
-
-
 def test_every_problem_of_a_protocol_has_its_line_and_column(told, tmp_path):
     protocol = tmp_path / "bad.yaml"
     text = short().replace("drop: 180 mm", "drop: 180 kg").replace("repeats: 2", "repeat: 2")
@@ -92,15 +86,6 @@ def test_every_problem_of_a_protocol_has_its_line_and_column(told, tmp_path):
         } <= found
         assert any(key == "plan.repeat" for _, key in found)
     assert not (tmp_path / "s").exists()
-
-
-def test_a_protocol_without_gates_points_to_predict(told, tmp_path):
-    beads = PROTOCOLS / "bead-chain.yaml"
-    said = told("run", beads, "--port", "sim://", "--session", tmp_path / "s")
-    message, hint = said.splitlines()
-    assert message == f"{beads} has no gates, so nothing can be measured"
-    assert f"rig predict {beads}" in hint
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_session_of_another_protocol_is_not_continued(told, finished, tmp_path):

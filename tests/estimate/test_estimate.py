@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from rig.analysis.result import GOOD
-from rig.analysis.session import analyze
 from rig.errors import InputError
 from rig.estimate.coefficients import best, coefficient_problem
 from rig.estimate.hypotheses import one_alpha
@@ -23,10 +22,9 @@ from rig.protocol.reader import parse
 from rig.report.estimate import estimate_text
 from rig.sections import Sections
 from rig.units import Quantity
-from sim.dials import Dials
 from tests.analysis.drops import FENCE, SINGLE, UNIFORM, case
+from tests.analysis.sessions import MILD, cases
 from tests.analysis.sessions import analysis as analyzed
-from tests.analysis.sessions import cases
 from tests.analysis.test_datum_board import BOARD_GRADED
 from tests.estimate.sessions import BETA, MU, analysis, forms
 
@@ -175,8 +173,7 @@ def test_good_drops_that_no_motion_fits_are_left_out_and_named():
 
 def dropped(protocol, numbers):
     """Drops of a scene of its own, analysed."""
-    drops = [case(protocol, Dials(skew_sd=1e-3), run=number) for number in numbers]
-    return analyze(protocol, [one.drop for one in drops], lambda _: drops[0].scale)
+    return analyzed([case(protocol, MILD, run=number) for number in numbers])
 
 
 def test_air_that_the_protocol_states_counts_once():
