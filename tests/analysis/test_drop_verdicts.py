@@ -15,7 +15,6 @@ from rig.analysis.result import DropResult
 from rig.analysis.session import analyze
 from rig.analysis.verdict import _SURE, _air
 from rig.errors import InputError
-from rig.model.chain import Chain
 from rig.protocol.protocol import Accept, Gates
 from rig.protocol.reader import parse
 from rig.reasons import Reason, make_reason, plain_reason
@@ -25,7 +24,6 @@ from sim.dials import Dials
 from tests.analysis.drops import (
     FENCE,
     HZ,
-    SCENES,
     SINGLE,
     UNIFORM,
     Case,
@@ -267,27 +265,6 @@ def test_a_session_of_void_drops_has_no_summary():
     assert "summary_with_rejected" not in found.json()
     assert analyze(SINGLE, [], scale).json() == {"runs": [], "summary": []}
     assert first_run(SINGLE, None) == 1
-
-
-@pytest.mark.parametrize("scene", SCENES)
-@pytest.mark.parametrize("rods", [1, 2])
-def test_a_chain_of_few_rods(scene, rods):
-    protocol = SCENES[scene]
-    few = {
-        name: replace(
-            rod_chain,
-            chain=Chain(rod_chain.chain.masses[:rods], rod_chain.chain.heights[:rods]),
-            widths=rod_chain.widths[:rods],
-            diameters=rod_chain.diameters[:rods],
-        )
-        for name, rod_chain in protocol.chains.items()
-    }
-    one = case(replace(protocol, chains=few), Dials.quiet())
-    result = one.analyze()
-    assert result.verdict == "accepted"
-    assert result.matches == {n: edge[3] for n, edge in enumerate(one.truth.edges)}
-    assert_true(result, one.truth, 0.005)
-    printable(result)
 
 
 @pytest.mark.parametrize(("share", "pushed"), [(0.9, False), (1.1, True)])
