@@ -65,33 +65,27 @@ def test_a_void_drop_says_what_to_do():
 
 def test_enter_is_not_offered_before_the_verdict_is_kept():
     """It would do nothing: what comes next depends on the verdict."""
-    waits = replace(model("x"), driving=True)
-    kept, job = replace(waits, flow=replace(waits.flow, logged=True)), Job(2, 1)
-    waits = replace(waits, flow=replace(waits.flow, logged=False))
-    assert step(waits.flow, GoOn(job, 0.0)) == (waits.flow, ())
-    assert (
-        "Enter after the verdict is saved"
-        in hints(replace(waits, page="result"), KEYS, 80, lambda _: True).plain
-    )
-    assert step(kept.flow, GoOn(job, 0.0))[0].job == job
-    assert "Enter end" in hints(replace(kept, page="result"), KEYS, 80, lambda _: True).plain
+    shown = replace(model("x"), driving=True)
+    waits, kept = (replace(shown.flow, logged=logged) for logged in (False, True))
+    job = Job(2, 1)
+    assert step(waits, GoOn(job, 0.0)) == (waits, ())
+    assert "Enter after the verdict is saved" in keys_of(replace(shown, flow=waits))
+    assert step(kept, GoOn(job, 0.0))[0].job == job
+    assert "Enter end" in keys_of(replace(shown, flow=kept))
+
+
+def keys_of(shown, width=80):
+    return hints(replace(shown, page="result"), KEYS, width, lambda _: True).plain
 
 
 @pytest.mark.parametrize("width", [20, 40, 78, 198])
 def test_keys_fit_their_line(width):
-    assert (
-        len(hints(replace(model("x"), page="result"), KEYS, width, lambda _: True).plain) <= width
-    )
+    assert len(keys_of(model("x"), width)) <= width
 
 
 RUN = {"run": 1, "incline_deg": 40, "impact": "A", "free": "B", "setting": "",
        "attempt": 0, "state": "planned", "reasons": [], "reason_codes": []}  # fmt: skip
-STATE = {
-    "phase": "idle", "link": {"state": "up", "error": None, "retry_s": None},
-    "port": {"url": "sim://", "simulated": True}, "gates": {"blocked": 5, "age_s": 0.0},
-    "drop": None, "session": None, "control": None, "error": None,
-    "runs": [RUN, RUN | {"run": 2, "impact": "B", "free": "A"}], "edges": [[1, 2, 1]],
-}  # fmt: skip
+STATE = QUIET | {"runs": [RUN], "edges": [[1, 2, 1]]}
 
 
 def test_what_the_daemon_does_not_know_is_not_known():
