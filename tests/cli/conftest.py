@@ -1,6 +1,7 @@
 """Small finished sessions and protocols."""
 
 import json
+import os
 import shutil
 import signal
 from collections.abc import Iterator
@@ -85,6 +86,15 @@ def fence(tmp_path: Path) -> Path:
     path = tmp_path / "fence.yaml"
     path.write_text(short_fence(), "utf-8")
     return path
+
+
+@pytest.fixture
+def unread() -> Iterator[int]:
+    """Open a stream at whose other end nobody listens."""
+    ours, theirs = os.pipe()
+    os.close(ours)
+    yield theirs
+    os.close(theirs)
 
 
 @pytest.fixture(autouse=True)
