@@ -33,44 +33,34 @@ def rows(edges, form="{c},{t:.6f},{d}\n"):
 HEAD = "gate,time (s),state\n"
 
 
-def test_every_row_is_counted(look):
-    done = look(HEAD + rows(RUNS[0]))
-    assert "1 run, 8 rows: 8 edges" in done.err
-    assert "8 of 8 edges where a fall puts them; g 9.8" in done.out
-    assert "the protocol says" not in done.err
+FALL, MAPPED = RUNS[0], ("--map", "0=0,1=1,2=2,3=3")
+UNUSED = rows(FALL) + "7,0.8,1\n7,0.81,0\n"
 
 
-def test_a_fall_that_is_not_the_protocols_is_doubted(look):
-    done = look(HEAD + rows((1.1 * t, channel, dark) for t, channel, dark in RUNS[0]))
-    assert "free fall gives g = 8." in done.err
-    assert "the protocol says 9.8" in done.err
-
-
-def test_rows_that_are_not_used_are_an_error_unless_they_are_allowed(look):
-    content = HEAD + rows(RUNS[0]) + "7,0.8,1\n7,0.81,0\n"
-    options = ("--map", "0=0,1=1,2=2,3=3")
-    assert "2 of 10 rows unused: lines 10, 11" in look(content, *options, code=2).err
-    assert "8 edges; 2 rows unused: lines 10, 11" in look(content, *options, "--allow-unused").err
-
-
-def test_a_gate_that_the_file_lacks_is_said(look):
-    done = look(HEAD + rows(edge for edge in RUNS[0] if edge[1] != 2))
-    assert "the file has nothing of the gates at channels 2" in done.err
-
-
-def test_more_edges_than_the_object_makes_are_refused(look):
-    content = HEAD + rows((t, 1, d) for t, _, d in RUNS[0])
-    look(content, code=2)
-    look(content, "--as-read")
-
-
-def test_a_run_that_is_no_fall_is_named_with_its_line(look):
-    done = look(HEAD + 5 * ("Run\n" + rows(RUNS[0])) + "Run\n0,0.4,1\n0,0.9,0\n", code=2)
-    assert "file.txt:48:1: run 6: at most 12 % of its edges" in done.err
+@pytest.mark.parametrize(
+    ("content", "options", "code", "said"),
+    [
+        (rows(FALL), (), 0, "1 run, 8 rows: 8 edges"),
+        (rows(FALL), (), 0, "8 of 8 edges where a fall puts them; g 9.8"),
+        (rows((1.1 * t, c, d) for t, c, d in FALL), (), 0, "free fall gives g = 8."),
+        (UNUSED, MAPPED, 2, "2 of 10 rows unused: lines 10, 11"),
+        (UNUSED, (*MAPPED, "--allow-unused"), 0, "8 edges; 2 rows unused: lines 10, 11"),
+        (rows(row for row in FALL if row[1] != 2), (), 0, "nothing of the gates at channels 2"),
+        (rows((t, 1, d) for t, _, d in FALL), (), 2, ""),  # more than the object makes
+        (rows((t, 1, d) for t, _, d in FALL), ("--as-read",), 0, ""),
+        (5 * ("Run\n" + rows(FALL)) + "Run\n0,0.4,1\n0,0.9,0\n", (), 2,
+         "file.txt:48:1: run 6: at most 12 % of its edges"),
+    ],
+)  # fmt: skip
+def test_what_is_said_of_a_fall(look, content, options, code, said):
+    done = look(HEAD + content, *options, code=code)
+    assert said in done.out + done.err
+    doubted = "the protocol says 9.8" in done.err
+    assert doubted == said.startswith("free fall gives g = 8")
 
 
 def test_two_wires_at_one_stamp_of_a_dump_are_refused(look):
-    first, second = (f"#{round(time * 1e6)}\n" for time, _, _ in RUNS[0][1:3])
+    first, second = (f"#{round(time * 1e6)}\n" for time, _, _ in FALL[1:3])
     content = shapes()["VCD"].content.decode()
     done = look(content.replace(second, ""), code=2)
     assert first in content
@@ -88,7 +78,7 @@ def test_what_is_said_of_a_file(look, content, options, code, said):
     [
         shapes()["Gates below each other"].content,
         shapes()["Milliseconds without a unit"].content,
-        HEAD + rows(RUNS[0][::-1]),
+        HEAD + rows(FALL[::-1]),
         "Run,gate 0 (s),gate 1 (s)\n1,0.40031,0.553153\n2,0.370305,0.523153\n",
     ],
 )
