@@ -15,7 +15,7 @@ from rig.daemon.replica import Replica
 from rig.errors import InputError
 from rig.reasons import make_reason, plain_reason, remedies
 from rig.records import Job
-from rig.tui.actions import ACTIONS, BY_NAME, help_text, possible, shown_key
+from rig.tui.actions import ACTIONS, BY_NAME, help_text, shown_key
 from rig.tui.app import RigApp
 from rig.tui.ascii import in_ascii
 from rig.tui.client import ReconnectingClient
@@ -183,19 +183,6 @@ def test_help_has_every_action_under_one_heading():
     for action in ACTIONS:
         assert text.count(f"  {shown_key(action.keys):8}{action.text}") == 1
         assert text.count(f"\n{action.group}\n") == 1
-
-
-def test_stop_is_possible_always():
-    for stage in Stage:
-        for driving in (True, False):
-            assert possible(BY_NAME["stop"], stage, driving=driving)
-
-
-def test_what_drives_the_rig_needs_control_and_its_stage():
-    arms = BY_NAME["go_on"]
-    assert possible(arms, Stage.PREPARE, driving=True)
-    assert not possible(arms, Stage.PREPARE, driving=False)
-    assert not possible(arms, Stage.COUNTDOWN, driving=True)
 
 
 def test_a_file_changes_keys_and_takes_them_from_others(tmp_path):
