@@ -55,17 +55,6 @@ def test_a_touching_rod_has_one_point_on_the_board_and_none_below(incline):
     assert lowest == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("incline", "unlike"), [(0.0, True), (40.0, True), (89.0, False), (90.0, False)]
-)
-def test_rods_strike_after_the_release_and_in_turn(incline, unlike):
-    """Or all at one height: no fall has them in another order."""
-    rods = BOARD_GRADED.chains["A"]
-    higher = np.array(contact.higher_contacts(BOARD_GRADED, incline, rods))
-    assert higher.any() == unlike
-    assert np.all(np.diff([-BOARD_GRADED.drop.value, *(rods.chain.heights - higher)]) > 0.0)
-
-
 @pytest.mark.parametrize("incline", [10.0, 50.0])
 def test_what_is_measured_is_the_same_from_board_and_from_contact(incline):
     """The very fall, with heights from either zero."""

@@ -30,7 +30,6 @@ from tests.analysis.drops import (
     assert_true,
     case,
     codes,
-    first_run,
     with_dials,
 )
 from tests.examples import examples
@@ -264,7 +263,6 @@ def test_a_session_of_void_drops_has_no_summary():
     assert found.summary == found.with_rejected == ()
     assert "summary_with_rejected" not in found.json()
     assert analyze(SINGLE, [], scale).json() == {"runs": [], "summary": []}
-    assert first_run(SINGLE, None) == 1
 
 
 @pytest.mark.parametrize(("share", "pushed"), [(0.9, False), (1.1, True)])

@@ -11,8 +11,7 @@ from typing import Any
 
 import pytest
 
-from rig.cli import main
-from tests.cli.lab import rig, short, short_fence
+from tests.cli.lab import record, rig, short, short_fence
 from tests.once import (
     analysed_once,  # noqa: F401 - a fixture
     filled_once,
@@ -52,12 +51,9 @@ def fences(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Record five drops of a fence, which are quickly analysed; its protocol lies beside it."""
 
     def fill(folder: Path) -> None:
-        protocol = folder / "fences.yaml"
-        protocol.write_text(short_fence(5, "5 s"), "utf-8")
-        words = ["run", protocol, "--port", "sim://?seed=2", "--session", folder / "s"]
-        assert main([*map(str, words)]) == 0
+        record(folder, short_fence(5, "5 s"), "sim://?seed=2", "fences")
 
-    return filled_once(tmp_path_factory, "fences", fill) / "s"
+    return filled_once(tmp_path_factory, "fences", fill) / "fences.session"
 
 
 @pytest.fixture(scope="session")

@@ -165,13 +165,6 @@ def test_a_port_that_is_back_before_anybody_looked_was_lost_all_the_same():
     assert not [*_back(line, back)]
 
 
-def test_a_watcher_sees_where_the_drop_is():
-    for drop, stage in (("armed", Stage.COUNTDOWN), ("fired", Stage.LIVE)):
-        watched = _model({"drop": {"run": 1, "attempt": 1, "state": drop}})
-        assert watched.stage is stage
-    assert _model({"drop": {"state": "armed"}}, driving=True).stage is Stage.PROTOCOL
-
-
 def test_every_key_has_one_meaning():
     keys = Counter(key for action in ACTIONS for key in action.keys.split(","))
     assert max(keys.values()) == 1
