@@ -46,10 +46,6 @@ def flicker(port):
     port.board.touch(0)
 
 
-def block(port):
-    port.board.touch(1 << 1)
-
-
 def press_stop(port):
     port.board.stop(True)
     port.clock.sleep(1e-3)  # longer than any spike
@@ -57,16 +53,13 @@ def press_stop(port):
     port.board.stop(False)
 
 
-def stay_away(port):
-    port.clock.sleep(0.3)
-
-
 HAPPENINGS = [
     (flicker, "gate 1 changed after arming"),
-    (block, "gate 1 is blocked"),
+    (lambda port: port.board.touch(1 << 1), "gate 1 is blocked"),
     (press_stop, "the device disarmed itself: the emergency stop was opened"),
-    (stay_away, "the device disarmed itself: this program was silent for too long"),
-]
+    (lambda port: port.clock.sleep(0.3),
+     "the device disarmed itself: this program was silent for too long"),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("happen", "why"), HAPPENINGS)
