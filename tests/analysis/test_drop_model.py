@@ -8,7 +8,7 @@ import pytest
 from rig.analysis.adjust import adjust
 from rig.analysis.drop_model import DropModel
 from rig.analysis.quantities import measurands
-from tests.analysis.drops import GRADED, SCENES, STATED, UNIFORM, case, with_dials
+from tests.analysis.drops import GRADED, SCENES, UNIFORM, case, with_dials
 
 GAINS = ("alpha", "impulses", "strings")
 """Unknowns with a step of 1e-5; of the rest it is 1e-6 in m, s, m/s² and relative."""
@@ -164,38 +164,3 @@ def test_a_beam_off_the_middle_counts_as_the_rods_are_tilted():
         model, _, _ = case(protocol).model()
         ripple = model.unknowns.sd[model.unknowns["ripple"]]
         assert ripple == pytest.approx([1e-3 * math.tan(math.radians(tilt))] * 16)
-
-
-def test_an_edge_is_as_sure_as_the_chain_is_slow():
-    """σ² = floor² + (V · jitter)², and a flicker is no better than it lasts.
-
-    Once rods have struck, those that still fall may be off their chain, few further than many; the
-    last one is the chain.
-    """
-    model, matches, x = case(UNIFORM, seed=3).model()
-    for role, match in matches.items():
-        found = model.residuals(role, x, match)
-        gates = [*model.records[role].by_gate(match)]
-        times = np.concatenate([t.times[m[m >= 0]] for t, _, m in gates])
-        burst = np.concatenate([t.burst[m[m >= 0]] for t, _, m in gates])
-        clock = x[model.unknowns["clock"]]
-        _, speed = model.trajectory(role, x).heights(times * (1.0 + clock))
-        rods = np.concatenate([t.rods[m >= 0] for t, _, m in gates])
-        hits = model.trajectory(role, x).time[1:]
-        off = np.zeros(times.size)
-        if role == "impact":
-            last = (rods == hits.size - 1) & (times > hits[-2])
-            left = hits.size - np.sum(times[:, None] > hits, axis=1)
-            further = STATED.few / np.maximum(left, 1)
-            off = np.where((times > hits[0]) & ~last, np.hypot(STATED.departure, further), 0.0)
-            assert left[~last].min() == 2
-            assert last.any()
-        edges, seen = model.expected[role], match >= 0
-        landed = (edges.landed * ~edges.alone)[seen]
-        expected = [
-            math.sqrt(STATED.floor**2 + v**2 * (STATED.jitter**2 + b**2) + d**2 + early**2)
-            for v, b, d, early in zip(speed, burst, off, landed, strict=True)
-        ]
-        np.testing.assert_allclose(found.sigma, expected, rtol=1e-12)
-        assert (burst > 0.0).any()
-        assert (burst == 0.0).mean() > 0.9
