@@ -4,8 +4,9 @@ import json
 import os
 import shutil
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -82,6 +83,13 @@ def fence(tmp_path: Path) -> Path:
     path = tmp_path / "fence.yaml"
     path.write_text(short_fence(), "utf-8")
     return path
+
+
+@pytest.fixture
+def run(call: Callable[..., Done], tmp_path: Path, fence: Path) -> Callable[..., Done]:
+    """Record two drops of a fence: what falls is all the same to a recording."""
+    words = ("run", fence, "--port", "sim://?seed=1", "--session", tmp_path / "s", "--yes")
+    return partial(call, *words)
 
 
 @pytest.fixture

@@ -6,7 +6,6 @@ import subprocess
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from itertools import count
 from unittest.mock import Mock
 
@@ -24,12 +23,6 @@ from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.cli import lab
 from tests.waiting import PATIENCE_S, until
-
-
-@pytest.fixture
-def protocol(fence):
-    """What falls is all the same to a recording: bars, whose edges are identified at once."""
-    return fence
 
 
 def stopped(arguments, session, number, wait_s):
@@ -123,12 +116,6 @@ def test_signals_at_random_moments_of_a_fast_campaign_cost_no_run(tmp_path):
 
 
 # ------------------------------------------------- moments that chance would seldom choose
-
-
-@pytest.fixture
-def run(call, tmp_path, protocol):
-    words = ("run", protocol, "--port", "sim://?seed=1", "--session", tmp_path / "s")
-    return partial(call, *words)
 
 
 @pytest.mark.parametrize(
@@ -316,10 +303,10 @@ def test_a_drop_that_a_restart_cut_short_is_made_again(run, tmp_path, monkeypatc
 
 @pytest.mark.parametrize("one_board", ["board restarts"], indirect=True)
 def test_a_drop_of_another_session_is_neither_taken_nor_discarded(
-    call, run, tmp_path, protocol, monkeypatch, one_board
+    call, run, tmp_path, fence, monkeypatch, one_board
 ):
     def other(name, **ends):
-        words = ("run", protocol, "--port", "sim://", "--session", tmp_path / name)
+        words = ("run", fence, "--port", "sim://", "--session", tmp_path / name)
         return call(*words, "--seed", 1, **ends)
 
     other("older")

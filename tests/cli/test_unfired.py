@@ -1,6 +1,5 @@
 """A device that will not arm or fire costs time, and never a run."""
 
-from functools import partial
 from itertools import count
 
 import pytest
@@ -13,12 +12,6 @@ from rig.session.store import Session
 from tests.cli.lab import assert_whole, drops_of, log_of, truth_of
 
 ARMED, FIRED, INTERRUPTED = RunState.ARMED, RunState.FIRED, RunState.INTERRUPTED
-
-
-@pytest.fixture
-def run(call, tmp_path, fence):
-    words = ("run", fence, "--port", "sim://?seed=1", "--session", tmp_path / "s", "--yes")
-    return partial(call, *words)
 
 
 @pytest.fixture
