@@ -138,7 +138,7 @@ def test_a_damaged_drop_is_called_damaged_and_the_others_are_analysed(
     assert "1 of 3 drops (run 2, attempt 1)" in page.read_text("utf-8")
 
 
-def test_a_byte_of_the_log_altered_costs_no_drop(call, sound, tmp_path):
+def test_a_byte_of_the_log_altered_costs_no_drop(sound, tmp_path):
     """The edges have their certificate's CRC."""
     path = tmp_path / "altered"
     with closing(sqlite3.connect(sound)) as connection:

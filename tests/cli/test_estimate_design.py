@@ -41,9 +41,9 @@ def test_pictures_of_an_estimate_are_stamped(call, finished, tmp_path):
     assert all("SIMULATED" in text for text in texts.values())
 
 
-def test_a_design_of_what_is_there(call, tmp_path):
-    done = call("design", PROTOCOLS / "single-chain.yaml", "--no-search", "--json")
-    found = json.loads(done.out)
+def test_a_design_of_what_is_there(call):
+    words = ("design", PROTOCOLS / "single-chain.yaml", "--no-search", "--json")
+    found = json.loads(call(*words).out)
     assert found["scatter"] == "stated"
     assert "proposed" not in found
     assert found["current"]["readable"]
@@ -51,11 +51,7 @@ def test_a_design_of_what_is_there(call, tmp_path):
     # About that of a drop measured by itself.
     u = case(SINGLE, Dials.quiet()).analyze().quantities["speed_m_s"].u
     assert speed["u_run"] == pytest.approx(u, rel=0.1)
-    twice = json.loads(
-        call(
-            "design", PROTOCOLS / "single-chain.yaml", "--no-search", "--json", "--repeats", "48"
-        ).out
-    )
+    twice = json.loads(call(*words, "--repeats", "48").out)
     (again,) = [one for one in twice["current"]["measurands"] if one["name"] == "speed_m_s"]
     assert again["inclines"][0]["u_mean"] < speed["inclines"][0]["u_mean"]
 

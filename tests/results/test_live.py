@@ -17,12 +17,11 @@ from rig.analysis.summary import Incline
 from rig.clock.calibration import TimeScale
 from rig.protocol.protocol import Condition
 from rig.reasons import make_reason, plain_reason
-from rig.records import Job
 from rig.results.blind import veiled_drop
 from rig.results.improvements import improvements
 from rig.results.known_drops import KnownDrops
 from rig.results.live import LiveAnalysis
-from rig.results.whole import calibration, complete_analysis, results
+from rig.results.whole import complete_analysis, results
 from rig.session.schema import RunState
 from rig.session.store import Session
 from sim.dials import Dials
@@ -87,27 +86,6 @@ def test_the_first_reading_of_a_session_whose_results_are_kept_has_them_all(sess
     for job in view.jobs:
         pairs = [compare(one.protocol, [one.results[job]]) for one in (view, cold)]
         assert pairs[0] == pairs[1]
-
-
-def test_results_that_are_kept_have_the_whole_calibration(session):
-    """Also how a clock's rate changed in time, by which edges are exported."""
-    with Session.open(session, readonly=True) as opened:
-        cold, kept = results(opened, fresh=True), results(opened)
-        assert cold.complete
-        assert not kept.complete
-        clock = calibration(opened)
-        for drop in opened.drops():
-            assert cold.clock.scale(drop) == kept.clock.scale(drop) == clock.scale(drop)
-
-
-def test_a_rejected_drop_keeps_the_verdict_of_its_limits(session):
-    reject(session, 6)
-    view = LiveAnalysis(session).read()
-    result = view.results[Job(6, 1)]
-    assert (result.verdict, result.limits) == ("rejected", "accepted")
-    assert view.fitted == 0
-    assert view.analysis.with_rejected
-    assert view.analysis.effects
 
 
 def test_a_drop_is_judged_as_it_is_read(session):
