@@ -12,9 +12,9 @@ from rig.analysis.chain_records import ChainRecord, EdgeArrays, edge_train
 from rig.analysis.components import Components
 from rig.analysis.drop import DropCase
 from rig.analysis.drop_model import DropModel
-from rig.analysis.fit import match
+from rig.analysis.fit import Fit, match
 from rig.analysis.identify import Identification, identify
-from rig.analysis.result import DropResult
+from rig.analysis.result import Audit, DropResult, Measured, Verdict
 from rig.clock.calibration import TimeScale
 from rig.link.messages import pack_label
 from rig.model.chain import Chain
@@ -44,6 +44,11 @@ def codes(result: DropResult) -> list[str]:
     return [reason.code for reason in result.reasons]
 
 
+def made_up(run: Run, verdict: Verdict = "accepted", **quantities: Measured) -> DropResult:
+    """Results of a drop that nobody let go."""
+    return DropResult(run, 1, verdict, (), Audit(660, 660), quantities)
+
+
 def with_dials(**changes: float) -> Dials:
     """Nothing disturbed but what is named."""
     return Dials(**(asdict(Dials.quiet()) | changes))
@@ -57,13 +62,15 @@ class Case:
     truth: Truth
     scale: TimeScale
 
+    def read(self, explain: bool = True) -> tuple[DropResult, Fit | None]:
+        return DropCase(self.protocol, self.run, self.drop, self.scale).read(explain=explain)
+
     def analyze(self) -> DropResult:
-        return DropCase(self.protocol, self.run, self.drop, self.scale).read()[0]
+        return self.read()[0]
 
     def judge(self) -> DropResult:
         """The same, but what else would explain a void drop is not sought: that takes longest."""
-        one = DropCase(self.protocol, self.run, self.drop, self.scale)
-        return one.read(explain=False)[0]
+        return self.read(explain=False)[0]
 
     def with_edges(self, edges) -> Case:
         """The same drop with other edges; they need not be in order of time."""

@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable
 from functools import cache
+from typing import Any
 
-from rig.analysis.drop import DropCase
 from rig.analysis.fit import Fit
 from rig.analysis.joint_fit import JointFit, joint_fit
 from rig.analysis.session import Analysis, analyze
+from rig.protocol.protocol import Protocol
 from sim.dials import Dials
 from tests.analysis.drops import SCENES, Case, case
 
@@ -22,7 +23,7 @@ def cases(
 
 def fits(drops: Iterable[Case]) -> list[Fit]:
     """Each drop by itself."""
-    found = [DropCase(one.protocol, one.run, one.drop, one.scale).read() for one in drops]
+    found = [one.read() for one in drops]
     assert all(result.verdict == "accepted" for result, _ in found)
     return [fit for _, fit in found if fit is not None]
 
@@ -34,5 +35,7 @@ def fit_session(
     return joint_fit(fits(cases(runs, dials, seed, scene)))
 
 
-def analysis(drops: list[Case]) -> Analysis:
-    return analyze(drops[0].protocol, [one.drop for one in drops], lambda _: drops[0].scale)
+def analysis(drops: list[Case], protocol: Protocol | None = None, *more: Any) -> Analysis:
+    """What drops say together, by their own protocol or by another one."""
+    stated, scale = protocol or drops[0].protocol, drops[0].scale
+    return analyze(stated, [one.drop for one in drops], lambda _: scale, *more)

@@ -15,12 +15,11 @@ from rig.analysis.drop_model import DropModel
 from rig.analysis.dual import Dual
 from rig.analysis.gravity import free_gravity
 from rig.analysis.quantities import AdjustedDrop
-from rig.analysis.session import analyze
 from rig.protocol.plan import runs as planned
 from rig.protocol.protocol import Contact
 from rig.units import Quantity
 from tests.analysis.drops import PROTOCOLS, SCENES, assert_true, case
-from tests.analysis.sessions import MILD
+from tests.analysis.sessions import MILD, analysis
 
 
 def record_of(scene, role, incline=None):
@@ -74,7 +73,7 @@ def test_a_chain_of_another_wood_needs_not_fall_as_its_width_says():
     )
     true = replace(stated, chains={"A": replace(chains["A"], weighed=True), "B": heavy})
     drops = [case(true, replace(MILD, drag=0.02), seed=3, run=run) for run in (1, 2, 3, 4)]
-    found = analyze(stated, [one.drop for one in drops], lambda _: drops[0].scale)
+    found = analysis(drops, stated)
     for one, result in zip(drops, found.runs, strict=True):
         assert result.learned
         assert_true(result, one.truth, 2.0)

@@ -7,10 +7,9 @@ from typing import Any
 import pytest
 
 from rig.analysis.curves import model_curves
-from rig.analysis.session import analyze
 from rig.model.predict import predict
-from sim.dials import Dials
 from tests.analysis.drops import FENCE, GRADED, SCENES, SINGLE, UNIFORM, case, first_run
+from tests.analysis.sessions import MILD, analysis
 
 RUN_KEYS = {"run", "incline_deg", "impact_chain", "edges", "verdict", "reasons"}
 MEASURED = {
@@ -33,14 +32,13 @@ def session(scene: str) -> dict[str, Any]:
     """Two good runs, a superseded attempt at the second and a void one."""
     protocol = SCENES[scene]
     first = first_run(protocol, 40.0 if scene == "uniform" else None)
-    mild = Dials(skew_sd=1e-3)
     cases = [
-        case(protocol, mild, run=first),
-        case(protocol, mild, run=first + 1),
-        case(protocol, mild, run=first + 1, attempt=2),
-        case(protocol, mild, run=first + 2).with_edges([]),
+        case(protocol, MILD, run=first),
+        case(protocol, MILD, run=first + 1),
+        case(protocol, MILD, run=first + 1, attempt=2),
+        case(protocol, MILD, run=first + 2).with_edges([]),
     ]
-    found = analyze(protocol, [one.drop for one in cases], lambda _: cases[0].scale)
+    found = analysis(cases)
     text = json.dumps(found.json(), allow_nan=False)
     return json.loads(text)
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.session import analyze
 from rig.errors import InputError
 from rig.predictions import predicted_run
 from rig.protocol import contact, reader
@@ -14,6 +13,7 @@ from rig.protocol.describe import describe
 from rig.reasons import sentences
 from sim.dials import Dials
 from tests.analysis.drops import GRADED, UNIFORM, assert_true, case
+from tests.analysis.sessions import analysis
 
 
 def raised(text: str, by_mm: float) -> str:
@@ -55,17 +55,6 @@ def test_a_touching_rod_has_one_point_on_the_board_and_none_below(incline):
     assert lowest == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("incline", "unlike"), [(0.0, True), (40.0, True), (89.0, False), (90.0, False)]
-)
-def test_rods_strike_after_the_release_and_in_turn(incline, unlike):
-    """Or all at one height: no fall has them in another order."""
-    rods = BOARD_GRADED.chains["A"]
-    higher = np.array(contact.higher_contacts(BOARD_GRADED, incline, rods))
-    assert higher.any() == unlike
-    assert np.all(np.diff([-BOARD_GRADED.drop.value, *(rods.chain.heights - higher)]) > 0.0)
-
-
 @pytest.mark.parametrize("incline", [10.0, 50.0])
 def test_what_is_measured_is_the_same_from_board_and_from_contact(incline):
     """The very fall, with heights from either zero."""
@@ -85,7 +74,7 @@ def test_what_is_measured_is_the_same_from_board_and_from_contact(incline):
 def test_drops_at_several_inclines_are_fitted_together():
     drops = [case(BOARD, Dials(), incline=incline, attempt=attempt)
              for incline in (10.0, 50.0) for attempt in (1, 2)]  # fmt: skip
-    found = analyze(BOARD, [one.drop for one in drops], lambda _: drops[0].scale)
+    found = analysis(drops)
     assert found.joint is not None
     results = [*found.runs, *found.superseded]
     truths = sorted((one.truth for one in drops), key=lambda one: (one.attempt, one.run))

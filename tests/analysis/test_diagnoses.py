@@ -8,7 +8,6 @@ import pytest
 from bench.studies.diagnoses import judged
 from bench.studies.layout_catalogue import KINDS, STANDARD, GateLayout, Kind, graded, under
 from bench.studies.wrong_rigs import WRONG_RIGS
-from rig.analysis.drop import DropCase
 from rig.analysis.faults import Premise, Suspects, alike, faults, rods_of, turn
 from rig.analysis.result import GOOD
 from rig.clock.calibration import TimeScale
@@ -171,7 +170,7 @@ def test_a_wrong_clock_and_wrong_gravity_cannot_be_told_apart_and_both_are_said(
     slow = TimeScale(one.scale.hz / (1.0 - share), one.scale.u)
     result = replace(one, scale=slow).analyze()
     # It reads well, but for what it is void: that must not depend on how many were void before.
-    late, _ = DropCase(one.protocol, one.run, one.drop, slow).read(explain=False)
+    late = replace(one, scale=slow).judge()
     assert (late.verdict, late.reasons) == ("void", result.reasons)
     (reason,) = result.reasons
     assert reason.code == "unclear_fault"

@@ -60,3 +60,14 @@ def test_the_order_of_simultaneous_edges():
     found, expected = other.analyze(), one.analyze()
     rods = tuple(found.rods[order.index(n)] for n in range(len(order)))
     assert_same(expected, replace(found, rods=rods), 0.0)
+
+
+@pytest.mark.parametrize("late", [1.0, 1800.0])
+def test_a_record_may_begin_long_before_the_fall_and_end_long_after_it(late):
+    """Also of half an hour, with edges at either end of it."""
+    ends = [Edge(0, 0, True), Edge(round(2 * late * HZ), 0, False)]
+    one = case(UNIFORM, Dials.quiet(), incline=40.0)
+    moved = [edge._replace(tick=edge.tick + round(late * HZ)) for edge in one.drop.edges]
+    result = one.with_edges([*ends, *moved]).analyze()
+    assert result.audit.missed == 0
+    assert result.audit.matched == len(moved)

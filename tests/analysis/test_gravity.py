@@ -18,8 +18,8 @@ QUIET = Dials.quiet()
 
 def read(one: Case, scale: TimeScale | None = None, protocol=None):
     """The result with its gravity, however wrong the drop is."""
-    case_ = DropCase(protocol or one.protocol, one.run, one.drop, scale or one.scale)
-    result, fit = case_.read(explain=False)
+    stated = replace(one, protocol=protocol or one.protocol, scale=scale or one.scale)
+    result, fit = stated.read(explain=False)
     return replace(result, gravity=result.quantities.get("gravity_m_s2") or free_gravity(fit))
 
 
@@ -87,5 +87,4 @@ def test_where_nothing_falls_freely_past_beams_there_is_no_check():
     single = case(SINGLE, QUIET)
     assert check(single, single.scale) is None
     void = case(UNIFORM, QUIET, incline=40.0).with_edges([])
-    result, _ = DropCase(UNIFORM, void.run, void.drop, void.scale).read()
-    assert check_gravity(UNIFORM, [result]) is None
+    assert check_gravity(UNIFORM, [void.analyze()]) is None

@@ -9,7 +9,6 @@ import pytest
 from bench.studies.layout_catalogue import LAYOUTS, STANDARD, GateLayout
 from rig.analysis.budgets import Budgets
 from rig.analysis.components import LEAST_SHARE, above
-from rig.analysis.drop import DropCase
 from rig.analysis.equations import STRAY, linearize
 from rig.analysis.fit import alone as fit_alone
 from rig.analysis.joint_fit import FEWEST, by_itself, joint_fit
@@ -211,12 +210,7 @@ def test_a_verdict_is_on_a_drop_by_itself_and_a_bad_one_teaches_nothing():
         else:
             assert (result.verdict, result.reasons) == (single.verdict, single.reasons)
             assert result.learned
-    rejected = analyze(
-        UNIFORM,
-        [one.drop for one in drops],
-        lambda _: drops[0].scale,
-        {(3, 1): ("the door slammed",)},
-    )
+    rejected = analysis(drops, UNIFORM, {(3, 1): ("the door slammed",)})
     assert [r.learned for r in rejected.runs] == [True] * 2 + [False] + [True] * 2
     assert len(rejected.joint.drops) == 4
 
@@ -229,8 +223,8 @@ def test_a_release_near_the_limit_is_judged_by_what_all_runs_say_of_it():
     # The limit lies between what the drop says by itself and what it says among all.
     scene = replace(UNIFORM, accept=replace(UNIFORM.accept, release_skew=sum(sizes) / 2.0))
     n = runs.index(latest)
-    alone, _ = DropCase(scene, drops[n].run, drops[n].drop, drops[n].scale).read()
-    among = analysis([replace(one, protocol=scene) for one in drops])
+    alone = replace(drops[n], protocol=scene).analyze()
+    among = analysis(drops, scene)
     assert (alone.verdict in GOOD) is (sizes[0] < sizes[1])
     assert (among.runs[n].verdict in GOOD) is (sizes[1] < sizes[0])
     assert ((latest.run.number, 1) in among.adjusted) is (sizes[1] < sizes[0])

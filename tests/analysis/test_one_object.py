@@ -7,7 +7,6 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from rig.analysis.drop import DropCase
 from rig.analysis.gate_passages import moment
 from rig.analysis.quantities import AdjustedDrop
 from rig.analysis.session import analyze
@@ -77,7 +76,7 @@ def test_without_disturbance_everything_is_as_it_fell(protocol):
 @BOTH
 def test_derivatives_at_a_gate_are_those_of_the_values(protocol):
     one = case(protocol, Dials(), run=1, seed=2)
-    fit = DropCase(protocol, one.run, one.drop, one.scale).read()[1]
+    _, fit = one.read()
     gate = protocol.gates.gates[2]
     here = moment(AdjustedDrop(fit.model, fit.x), gate)
     for at in np.flatnonzero(fit.model.unknowns.sd):

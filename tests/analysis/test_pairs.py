@@ -6,31 +6,27 @@ import numpy as np
 import pytest
 
 from rig.analysis.pairs import effects
-from rig.analysis.result import Audit, DropResult, Measured
+from rig.analysis.result import DropResult, Measured
 from rig.link.messages import pack_label
 from rig.protocol.plan import runs
 from sim.lab import ChainLab
-from tests.analysis.drops import SINGLE, UNIFORM
+from tests.analysis.drops import SINGLE, UNIFORM, made_up
 from tests.analysis.sessions import MILD, analysis, cases
 
-AUDIT = Audit(0, 0, 0, 0, 0)
 NAMES = ("separation_m", "separation_raw_m", "speed_m_s", "release_skew_s")
 TWELVE = tuple(range(1, 13))
 
 
-def made_up(value, u=1e-6, protocol=UNIFORM) -> list[DropResult]:
+def planned(value, u=1e-6, protocol=UNIFORM) -> list[DropResult]:
     """Every planned run accepted, with a value that may depend on its number and chain."""
     return [
-        DropResult(
-            run, 1, "accepted", (), AUDIT,
-            {name: Measured(value(run.number, run.impact), u) for name in NAMES},
-        )
+        made_up(run, **{name: Measured(value(run.number, run.impact), u) for name in NAMES})
         for run in runs(protocol)
-    ]  # fmt: skip
+    ]
 
 
 def test_a_drift_cancels_and_the_difference_stays():
-    found = effects(UNIFORM, made_up(lambda n, chain: 0.3 + 1e-3 * n + 2e-3 * (chain == "A")))
+    found = effects(UNIFORM, planned(lambda n, chain: 0.3 + 1e-3 * n + 2e-3 * (chain == "A")))
     assert [one.incline_deg for one in found] == sorted(UNIFORM.plan.inclines)
     for one in found:
         assert (one.chains, one.blocks) == (("A", "B"), 3)
@@ -45,14 +41,14 @@ def test_a_drift_cancels_and_the_difference_stays():
 def test_scatter_that_is_no_drift_counts_within_blocks_too():
     """1, −3, 3, −1 leave mean, chains and drift as they are: one degree of freedom a block."""
     off = (1e-3, -3e-3, 3e-3, -1e-3)
-    for one in effects(UNIFORM, made_up(lambda n, _: off[(n - 1) % 4])):
+    for one in effects(UNIFORM, planned(lambda n, _: off[(n - 1) % 4])):
         within = (3 * 20e-6 / 5 / 3) ** 0.5
         assert one.chain["speed_m_s"].budget["runs"] == pytest.approx(within, rel=1e-9)
         assert one.side["release_skew_s"].budget["runs"] == pytest.approx(within / 2, rel=1e-9)
 
 
 def test_blocks_that_lack_a_run_do_not_count():
-    good = made_up(lambda n, _: float(n))
+    good = planned(lambda n, _: float(n))
     at = [n for n, one in enumerate(good) if one.run.incline_deg == 40.0]
     good[at[5]] = replace(good[at[5]], verdict="void")
     blocks = {one.incline_deg: one.blocks for one in effects(UNIFORM, good)}
@@ -68,8 +64,8 @@ def test_blocks_that_lack_a_run_do_not_count():
 @pytest.mark.parametrize("order", ["alternate", "fixed"])
 def test_no_blocks_no_effects(order):
     other = replace(UNIFORM, plan=replace(UNIFORM.plan, order=order))
-    assert effects(other, made_up(lambda n, _: 0.0, protocol=other)) == ()
-    assert effects(SINGLE, made_up(lambda n, _: 0.0, protocol=SINGLE)) == ()
+    assert effects(other, planned(lambda n, _: 0.0, protocol=other)) == ()
+    assert effects(SINGLE, planned(lambda n, _: 0.0, protocol=SINGLE)) == ()
 
 
 def test_runs_by_themselves_share_nothing_but_their_own_chain():
@@ -78,7 +74,7 @@ def test_runs_by_themselves_share_nothing_but_their_own_chain():
     runs_ = [
         replace(one, quantities={n: Measured(1.0, 13e-3, budget=budget)
                                  for n in NAMES})
-        for one in made_up(lambda n, _: 0.0)
+        for one in planned(lambda n, _: 0.0)
     ]  # fmt: skip
     for one in effects(UNIFORM, runs_):
         assert one.chain["speed_m_s"].budget == pytest.approx(

@@ -6,7 +6,6 @@ import pytest
 
 from rig.analysis import sensitivity
 from rig.analysis.sensitivity import FACTOR, prior_sensitivity
-from rig.analysis.session import analyze
 from tests.analysis.drops import UNIFORM
 from tests.analysis.sessions import MILD, analysis, cases
 
@@ -22,7 +21,7 @@ def test_a_prior_moves_results_as_a_protocol_that_states_it_so(monkeypatch):
     assert {row["quantity"] for row in rows} == {"separation_m", "speed_m_s"}
     for word, factor in (("wider", FACTOR), ("narrower", 1.0 / FACTOR)):
         other = replace(UNIFORM, gates=replace(UNIFORM.gates, datum_u=0.3e-3 * factor))
-        (line,) = analyze(other, [one.drop for one in drops], lambda _: drops[0].scale).summary
+        (line,) = analysis(drops, other).summary
         (here,) = found.summary
         for row in rows:
             before, after = (one.means[row["quantity"]] for one in (here, line))

@@ -5,20 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from rig.analysis.averages import combine, mean
-from rig.analysis.budget_lines import effective_degrees
 from rig.analysis.distributions import coverage_factor
-from rig.analysis.result import Audit, DropResult, Measured
+from rig.analysis.result import DropResult, Measured
 from rig.analysis.summary import summarize
 from rig.model.chain import Chain
 from rig.protocol.plan import runs
 from rig.units import Quantity
-from tests.analysis.drops import FENCE, SINGLE, UNIFORM
+from tests.analysis.drops import FENCE, SINGLE, UNIFORM, made_up
 
-AUDIT = Audit(660, 660, 0, 0, 0)
 REFERENCE = {
     40.0: (0.11546810526538031, 6.9327596650855757),
     80.0: (0.0098142050953198042, 5.25798131),
@@ -55,45 +51,14 @@ def test_runs_that_happen_to_agree_are_no_better_than_each_allows():
     assert few.expanded == pytest.approx(4.302652729911275 * 3.0 / math.sqrt(10), rel=1e-9)
 
 
-def test_one_run_is_that_run():
-    one = replace(measured(7.0, own=3.0, common=4.0), degrees=3.0)
-    found = mean([one])
-    assert (found.value, found.u, found.degrees) == (7.0, 5.0, 3.0)
-    assert found.json() == one.json()
-    assert found.budget == pytest.approx({"runs": 3.0, "common": 4.0})
-
-
-@pytest.mark.parametrize(("line", "u"), [("datum", 1.0), ("width", 1.0), ("edges", 0.5)])
-def test_a_common_source_stays_and_an_own_one_averages(line, u):
-    assert mean([Measured(1.0, 1.0, math.inf, {line: 1.0})] * 4).u == pytest.approx(u)
-
-
-parts = st.floats(1e-6, 1e3)
-
-
-@given(
-    st.lists(st.tuples(st.floats(-1e3, 1e3), parts, parts), min_size=1, max_size=8),
-    st.floats(0.01, 100),
-)
-def test_a_mean_in_other_units_is_the_same(drawn, factor):
-    one = mean([measured(*run) for run in drawn])
-    other = mean([measured(*(factor * x for x in run)) for run in drawn])
-    assert other.value == pytest.approx(factor * one.value, rel=1e-9, abs=1e-9 * factor)
-    assert other.u == pytest.approx(factor * one.u, rel=1e-6)
-    least = math.hypot(*(common for *_, common in drawn)) / math.sqrt(len(drawn))
-    assert one.u >= least * (1 - 1e-9)
-    assert one.degrees >= 1 or len(drawn) > 1
-    assert one.degrees >= (len(drawn) - 1) * (1 - 1e-9)
-
-
 def results(protocol, values: dict[float, list[float]], verdict="accepted") -> list[DropResult]:
     """Made-up drops: Δz is the value, V fifty times it."""
     found = []
     for incline, numbers in values.items():
         planned = [run for run in runs(protocol) if run.incline_deg == incline]
         for run, x in zip(planned, numbers, strict=False):
-            quantities = {"separation_m": measured(x, 1e-4), "speed_m_s": measured(50 * x, 1e-2)}
-            found.append(DropResult(run, 1, verdict, (), AUDIT, quantities))
+            both = {"separation_m": measured(x, 1e-4), "speed_m_s": measured(50 * x, 1e-2)}
+            found.append(made_up(run, verdict, **both))
     return found
 
 
@@ -164,24 +129,15 @@ def test_like_chains_make_one_result():
 
 
 def test_one_chain_is_compared_by_its_speed_a_fence_by_gravity():
-    run = runs(SINGLE)[0]
-    drop = DropResult(run, 1, "accepted", (), AUDIT, {"speed_m_s": measured(6.9, 0.01)})
+    drop = made_up(runs(SINGLE)[0], speed_m_s=measured(6.9, 0.01))
     (line,) = summarize(SINGLE, [drop])
     assert set(line.predicted) == set(line.means) == {"speed_m_s"}
     assert line.predicted["speed_m_s"].value == pytest.approx(REFERENCE[40.0][1], rel=1e-12)
-    bars = DropResult(
-        runs(FENCE)[0], 1, "accepted", (), AUDIT, {"gravity_m_s2": measured(9.8, 0.01)}
-    )
+    bars = made_up(runs(FENCE)[0], gravity_m_s2=measured(9.8, 0.01))
     (line,) = summarize(FENCE, [bars])
     assert line.predicted == {"gravity_m_s2": FENCE.gravity}
     t = 1.964719837  # of 500 degrees of freedom
     assert line.normalized_error("gravity_m_s2") == pytest.approx(-0.01 / (t * 0.01), rel=1e-6)
-
-
-def test_a_guessed_size_counts_with_8_degrees_and_another_as_known_exactly():
-    degrees = effective_degrees(5.0, {"start height": 3.0, "datum": 4.0}, {})
-    assert degrees == pytest.approx(5.0**4 / (3.0**4 / 8.0))
-    assert effective_degrees(4.0, {"datum": 4.0}, {}) == math.inf
 
 
 def difference(some, reference):

@@ -1,17 +1,18 @@
 """Small finished sessions and protocols."""
 
 import json
+import os
 import shutil
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from rig.cli import main
-from tests.cli.lab import rig, short, short_fence
+from tests.cli.lab import record, rig, short, short_fence
 from tests.once import (
     analysed_once,  # noqa: F401 - a fixture
     filled_once,
@@ -51,12 +52,9 @@ def fences(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Record five drops of a fence, which are quickly analysed; its protocol lies beside it."""
 
     def fill(folder: Path) -> None:
-        protocol = folder / "fences.yaml"
-        protocol.write_text(short_fence(5, "5 s"), "utf-8")
-        words = ["run", protocol, "--port", "sim://?seed=2", "--session", folder / "s"]
-        assert main([*map(str, words)]) == 0
+        record(folder, short_fence(5, "5 s"), "sim://?seed=2", "fences")
 
-    return filled_once(tmp_path_factory, "fences", fill) / "s"
+    return filled_once(tmp_path_factory, "fences", fill) / "fences.session"
 
 
 @pytest.fixture(scope="session")
@@ -85,6 +83,22 @@ def fence(tmp_path: Path) -> Path:
     path = tmp_path / "fence.yaml"
     path.write_text(short_fence(), "utf-8")
     return path
+
+
+@pytest.fixture
+def run(call: Callable[..., Done], tmp_path: Path, fence: Path) -> Callable[..., Done]:
+    """Record two drops of a fence: what falls is all the same to a recording."""
+    words = ("run", fence, "--port", "sim://?seed=1", "--session", tmp_path / "s", "--yes")
+    return partial(call, *words)
+
+
+@pytest.fixture
+def unread() -> Iterator[int]:
+    """Open a stream at whose other end nobody listens."""
+    ours, theirs = os.pipe()
+    os.close(ours)
+    yield theirs
+    os.close(theirs)
 
 
 @pytest.fixture(autouse=True)

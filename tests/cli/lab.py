@@ -53,17 +53,6 @@ def record(folder: Path, text: str, url: str = "sim://", name: str = "s", codes=
     return session
 
 
-def without(key: str, text: str) -> str:
-    """Leave one top-level key out of a protocol."""
-    kept, leaving = [], False
-    for line in text.splitlines():
-        if not line.startswith(" "):
-            leaving = line.startswith(f"{key}:")
-        if not leaving:
-            kept.append(line)
-    return "\n".join(kept) + "\n"
-
-
 def command(*arguments: object) -> list[str]:
     """Name the program as a user starts it; a warning is an error there too."""
     return [sys.executable, "-W", "error", "-m", "rig", *map(str, arguments)]

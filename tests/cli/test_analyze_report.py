@@ -31,7 +31,7 @@ def test_the_report_is_one_page_that_loads_nothing(page):
     assert not re.findall(r"https?://(?!www\.w3\.org/)[^\s<]*", html)
 
 
-def test_the_report_has_the_stamp_all_figures_and_every_run(page, analysis, finished):
+def test_the_report_has_the_stamp_all_figures_and_every_run(page, finished):
     html = page.read_text("utf-8")
     assert html.startswith("<!DOCTYPE html>")
     assert "<title>SIMULATED – A short campaign</title>" in html
@@ -103,7 +103,6 @@ def test_scatter_is_told_beside_uncertainty(call, finished, analysis):
         assert expanded == pytest.approx(1e3 * line["separation_m"]["U95"], abs=1e-3)
 
 
-@pytest.mark.usefixtures("analysed_once")
 def test_a_budget_adds_up_and_agrees_with_its_trials(call, finished):
     done = call("analyze", finished.session, "--budget", 1, "--trials", 40, "--json")
     found = json.loads(done.out)

@@ -24,6 +24,7 @@ from tests.session.altering import alter, unguarded
 from tests.tables import cases
 
 pytestmark = pytest.mark.usefixtures("undrawn")
+DERIVE = once(bundling.derive_bundle)
 FLIPS = int(os.environ.get("RIG_FLIPS", "60"))
 
 
@@ -36,15 +37,10 @@ def bundle(fences, undrawn, tmp_path_factory):
     return path
 
 
-@pytest.fixture(scope="module")
-def derived():
-    return once(bundling.derive_bundle)
-
-
 @pytest.fixture
-def derived_once(derived, monkeypatch):
+def derived_once(monkeypatch):
     """Have nothing derived again where what is tested comes after that."""
-    monkeypatch.setattr(bundling, "derive_bundle", derived)
+    monkeypatch.setattr(bundling, "derive_bundle", DERIVE)
 
 
 @pytest.fixture

@@ -17,7 +17,6 @@ from tests.cli.test_replay import tamper
 PING, REFERENCE, STATUS = (wire.CODES[kind] for kind in (wire.Ping, wire.Reference, wire.Status))
 ARM, FIRE = wire.CODES[wire.Arm], wire.CODES[wire.Fire]
 CERTIFICATE, DISARMED = wire.CODES[wire.DropCertificate2], wire.CODES[wire.Disarmed]
-S = 10**9
 
 
 @pytest.fixture
@@ -73,7 +72,7 @@ def test_a_drifting_clock_gives_each_run_its_own_rate(measure, tmp_path, fence):
     assert lost["u_ppm"] > 10.0
 
 
-def test_gravity_that_is_not_the_places_is_said(measure, call, tmp_path, fence):
+def test_gravity_that_is_not_the_places_is_said(measure, call, fence):
     text = fence.read_text("utf-8")
     assert "gravity: 9.81" in text
     session, _ = measure()

@@ -121,17 +121,6 @@ def test_any_value_altered_costs_its_own_drop_and_no_other(part, call, sound, wi
         check(call, without, path, tmp_path, table, what)
 
 
-ALTERED = (
-    'UPDATE edge SET tick = tick + 64 WHERE "drop" = 2 AND idx = 5',
-    'UPDATE edge SET channel = channel + 1 WHERE "drop" = 2 AND idx = 1',
-    'UPDATE edge SET blocked = 1 - blocked WHERE "drop" = 2 AND idx = 1',
-    'DELETE FROM edge WHERE "drop" = 2 AND idx > 3',
-    'UPDATE "drop" SET fire_tick = fire_tick + 1 WHERE id = 2',
-    'UPDATE "drop" SET crc32 = crc32 + 1 WHERE id = 2',
-)
-BY_BYTES_ALONE = 'UPDATE "drop" SET tick_hz = tick_hz / 2 WHERE id = 2'
-
-
 @cases
 def test_a_damaged_drop_is_called_damaged_and_the_others_are_analysed(
     sql, bytes_too, call, sound, without, tmp_path
@@ -149,7 +138,7 @@ def test_a_damaged_drop_is_called_damaged_and_the_others_are_analysed(
     assert "1 of 3 drops (run 2, attempt 1)" in page.read_text("utf-8")
 
 
-def test_a_byte_of_the_log_altered_costs_no_drop(call, sound, tmp_path):
+def test_a_byte_of_the_log_altered_costs_no_drop(sound, tmp_path):
     """The edges have their certificate's CRC."""
     path = tmp_path / "altered"
     with closing(sqlite3.connect(sound)) as connection:

@@ -9,19 +9,9 @@ from rig.protocol import reader
 from sim.dials import Dials
 from tests.analysis.drops import SINGLE, case
 from tests.cli.lab import PROTOCOLS
-from tests.tables import cases
 
 pytestmark = pytest.mark.usefixtures("analysed_once")
 FENCE = PROTOCOLS / "picket-fence.yaml"
-
-
-@pytest.fixture(scope="module")
-def estimated(analysed_once, finished, tmp_path_factory):
-    from rig.cli import main
-
-    folder = tmp_path_factory.mktemp("estimated") / "pictures"
-    assert main(["estimate", str(finished.session), "-o", str(folder)]) == 0
-    return folder
 
 
 def test_an_estimate_says_everything_in_json(call, finished):
@@ -44,15 +34,16 @@ def test_an_estimate_as_text_is_stamped(call, finished):
         assert said in done.out
 
 
-def test_pictures_of_an_estimate_are_stamped(estimated):
-    names = {path.name for path in estimated.iterdir()}
-    assert {"alpha.svg", "curves.svg", "impulses.svg"} <= names
-    assert all("SIMULATED" in path.read_text("utf-8") for path in estimated.iterdir())
+def test_pictures_of_an_estimate_are_stamped(call, finished, tmp_path):
+    call("estimate", finished.session, "-o", tmp_path / "pictures")
+    texts = {path.name: path.read_text("utf-8") for path in (tmp_path / "pictures").iterdir()}
+    assert {"alpha.svg", "curves.svg", "impulses.svg"} <= texts.keys()
+    assert all("SIMULATED" in text for text in texts.values())
 
 
-def test_a_design_of_what_is_there(call, tmp_path):
-    done = call("design", PROTOCOLS / "single-chain.yaml", "--no-search", "--json")
-    found = json.loads(done.out)
+def test_a_design_of_what_is_there(call):
+    words = ("design", PROTOCOLS / "single-chain.yaml", "--no-search", "--json")
+    found = json.loads(call(*words).out)
     assert found["scatter"] == "stated"
     assert "proposed" not in found
     assert found["current"]["readable"]
@@ -60,11 +51,7 @@ def test_a_design_of_what_is_there(call, tmp_path):
     # About that of a drop measured by itself.
     u = case(SINGLE, Dials.quiet()).analyze().quantities["speed_m_s"].u
     assert speed["u_run"] == pytest.approx(u, rel=0.1)
-    twice = json.loads(
-        call(
-            "design", PROTOCOLS / "single-chain.yaml", "--no-search", "--json", "--repeats", "48"
-        ).out
-    )
+    twice = json.loads(call(*words, "--repeats", "48").out)
     (again,) = [one for one in twice["current"]["measurands"] if one["name"] == "speed_m_s"]
     assert again["inclines"][0]["u_mean"] < speed["inclines"][0]["u_mean"]
 
@@ -106,8 +93,3 @@ def test_a_design_by_the_scatter_that_a_session_taught(call, finished):
         "has another kind of scene"
         in call("design", FENCE, "--learned", finished.session, code=2).err
     )
-
-
-@cases
-def test_bad_limits_are_said(call, more, said):
-    assert said in call("design", FENCE, *more, code=2).err

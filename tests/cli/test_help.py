@@ -79,5 +79,9 @@ def test_examples_are_commands(line):
 
 
 @cases
-def test_a_mistake_is_named(call, words, said):
-    assert said in call(*words, code={2, 4}).err
+def test_a_mistake_is_named_and_nothing_is_written(call, words, said, tmp_path, monkeypatch):
+    (tmp_path / "there.yaml").touch()
+    monkeypatch.chdir(tmp_path)
+    done = call(*words, code={2, 4})
+    assert (done.out, said in done.err) == ("", True), done
+    assert [path.name for path in tmp_path.iterdir()] == ["there.yaml"]

@@ -5,6 +5,7 @@ import json
 import pytest
 
 from tests.cli.lab import drops_of, short
+from tests.tables import cases
 
 QUANTITIES = ("separation_m", "separation_raw_m", "speed_m_s", "release_skew_s")
 
@@ -115,14 +116,6 @@ def refused(bring, tmp_path):
     return lines
 
 
-@pytest.mark.parametrize(
-    "option", [("--unit", "ms"), ("--channel", "3"), ("--map", "0=1"), ("--dark", "low")]
-)
-def test_what_the_project_s_own_format_says_is_not_stated_again(refused, option):
-    first, _ = refused(*option)
-    assert first.startswith(f"{option[0]}: nothing is open in a file of the project's own format")
-
-
 def test_runs_beyond_the_plan_are_refused(refused, exported, tmp_path):
     events = tmp_path / "events.csv"
     events.write_text(
@@ -139,10 +132,11 @@ def test_what_is_missing_is_named(refused, tmp_path):
     assert line == f"{tmp_path / 'none.csv'}: cannot read this file: No such file or directory"
 
 
-@pytest.mark.parametrize("u", ["nan", "-1 ppm", "50", "3 mm", ""])
-def test_an_absurd_clock_is_refused(refused, u):
-    (line, *_) = refused(f"--clock-uncertainty={u}")
-    assert "--clock-uncertainty: found '" in line
+@cases
+def test_what_is_absurd_or_stated_again_is_refused(refused, option, value, said):
+    """The project's own format says all of a file, but how good its clock was."""
+    first, *_ = refused(f"{option}={value}")
+    assert first.removeprefix("rig import: argument ").startswith(f"{option}: {said}")
 
 
 def test_an_existing_session_is_never_imported_into(bring, tmp_path):

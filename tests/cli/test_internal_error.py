@@ -50,11 +50,8 @@ def test_where_no_log_can_be_written_that_is_said(home):
     assert "Traceback" not in done.stderr
 
 
-def test_the_exit_code_stays_when_nobody_reads_the_message(tmp_path):
-    ours, theirs = os.pipe()
-    os.close(ours)
-    done = ended(BROKEN.format("1 / 0", AT_WORK, ["check", "x"]), tmp_path, stderr=theirs)
-    os.close(theirs)
+def test_the_exit_code_stays_when_nobody_reads_the_message(tmp_path, unread):
+    done = ended(BROKEN.format("1 / 0", AT_WORK, ["check", "x"]), tmp_path, stderr=unread)
     assert done.returncode == 1
 
 

@@ -10,7 +10,6 @@ from rig.protocol.draft import SCENES, Draft, draft_text
 from rig.protocol.measurable import check_recordable
 from rig.protocol.reader import parse, read
 from tests.cli.lab import Terminal
-from tests.tables import cases
 
 
 def drafted(scene, gates, **changes):
@@ -89,10 +88,3 @@ def test_it_asks_for_what_is_not_said(call, tmp_path, monkeypatch):
     (draft,) = tried
     assert (draft.rods, draft.length, draft.diameter) == (6, "250 mm", "25 mm")
     assert (draft.drop, draft.repeats, draft.gates) == ("350 mm ± 1 mm", 5, 2)
-
-
-@cases
-def test_answers_that_make_no_protocol_are_refused(options, said, call, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    assert said in call("new", "x.yaml", *options, "--yes", code=2).err
-    assert not (tmp_path / "x.yaml").exists()

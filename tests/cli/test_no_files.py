@@ -43,21 +43,24 @@ def places(tmp_path, finished, fence):
     }
 
 
+def bind(path):
+    with socket.socket(socket.AF_UNIX) as made:
+        made.bind(str(path))
+
+
+NO_FILES = {
+    "pipe": os.mkfifo,
+    "folder": os.mkdir,
+    "socket": bind,
+    "device": lambda path: path.symlink_to("/dev/zero"),
+}
+
+
 @pytest.fixture
 def thing(request, tmp_path):
     """Make what is no file."""
-    path = tmp_path / "thing"
-    match request.param:
-        case "pipe":
-            os.mkfifo(path)
-        case "folder":
-            path.mkdir()
-        case "socket":
-            with socket.socket(socket.AF_UNIX) as made:
-                made.bind(str(path))
-        case "device":
-            path.symlink_to("/dev/zero")
-    return path
+    NO_FILES[request.param](tmp_path / "thing")
+    return tmp_path / "thing"
 
 
 @pytest.fixture(autouse=True)

@@ -7,19 +7,16 @@ import pytest
 
 import rig
 from rig.bundle.tables import column_unit
-from rig.cli import main
 from rig.errors import InputError
-from tests.cli.lab import PROTOCOLS
+from tests.cli.lab import PROTOCOLS, record
 
 pytestmark = pytest.mark.usefixtures("analysed_once")
 
 
 @pytest.fixture(scope="module")
 def ball(analysed_once, tmp_path_factory):
-    session = tmp_path_factory.mktemp("ball") / "ball.session"
-    words = ["run", PROTOCOLS / "falling-ball.yaml", "--port", "sim://?stated=1&seed=3"]
-    assert main([*map(str, words), "--session", str(session)]) == 0
-    return session
+    text = (PROTOCOLS / "falling-ball.yaml").read_text("utf-8")
+    return record(tmp_path_factory.mktemp("ball"), text, "sim://?stated=1&seed=3")
 
 
 @pytest.mark.parametrize("table", ["runs", "summary", "gates"])

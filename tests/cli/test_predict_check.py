@@ -1,4 +1,4 @@
-"""``rig predict`` and ``rig check``: what follows from a protocol alone."""
+"""``rig predict`` and ``rig check``: what follows from a protocol alone, before anything hangs."""
 
 import json
 
@@ -6,9 +6,10 @@ import pytest
 
 from rig.design.trials import Trials
 from rig.predictions import predictions
+from rig.protocol.describe import describe
 from rig.protocol.reader import read
-from tests.cli.lab import PROTOCOLS
-from tests.tables import read_table
+from tests.cli.lab import PROTOCOLS, short
+from tests.tables import cases, read_table
 
 FIELDS = {*read_table(__file__, "fields")["predictions"]}
 
@@ -85,6 +86,30 @@ def test_check_for_one_board_is_its_refusal(call):
     assert done.out == ""
     said = "gates.free[4].channel: found 12; the board (Arduino Uno) has gates 0 to 11: change this"
     assert f"{said}, or use a Raspberry Pi Pico or an Arduino Mega 2560" in done.err
+
+
+@cases
+def test_a_board_that_lacks_something_is_refused_before_anything_is_hung(
+    call, tmp_path, old, new, problem
+):
+    path, session = tmp_path / "p.yaml", tmp_path / "p.session"
+    path.write_text(short(repeats=1).replace(old, new), "utf-8")
+    done = call("run", path, "--port", "sim://", "--session", session, code=2)
+    assert done.out == ""
+    (line,) = done.err.splitlines()
+    assert f"{path}:{problem} the board (virtual) has" in line
+    assert not session.exists()
+    said = describe(read(path))
+    for word in ("mega", "uno"):
+        assert f"note: board {word} is not suitable: {path}:" in said
+
+
+@cases
+def test_what_makes_no_sense_is_said_at_its_place(old, new, said, call, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = (PROTOCOLS / "falling-ball.yaml").read_text("utf-8").replace(old, new, 1)
+    (tmp_path / "p.yaml").write_text(f"{text}track: {{incline: 5 deg}}\n", "utf-8")
+    assert said in call("check", "p.yaml", code=2).err
 
 
 def test_check_counts_runs_and_trial_drops(call, finished):

@@ -30,12 +30,8 @@ pytestmark = pytest.mark.usefixtures("undrawn")
 COMMANDS = [words.split() for words in read_table(__file__, "commands")["read"]]
 
 
-def fresh(session):
-    assert session.exists()
-
-
-def of_the_first_format(session):
-    outdate(session, 1)
+def log_beside(session):
+    return session.with_name(session.name + "-wal")
 
 
 def with_kept_results(session):
@@ -47,19 +43,7 @@ def with_kept_results(session):
 def interrupted(session):
     """Its writer was killed: what came last is in the log beside it only."""
     subprocess.run([sys.executable, "-c", WRITER, session, "die"], check=False)
-    assert session.with_name(session.name + "-wal").stat().st_size
-
-
-def emptied_log(session):
-    session.with_name(session.name + "-wal").touch()
-
-
-def read_only(session):
-    session.chmod(0o400)
-
-
-def read_only_folder(session):
-    session.parent.chmod(0o500)
+    assert log_beside(session).stat().st_size
 
 
 def state(folder):
@@ -93,18 +77,18 @@ READERS = [COMMANDS[0], *COMMANDS[6:9]]
 """Commands that open a session in ways of their own; the others do it as the first of these."""
 
 
-@pytest.mark.parametrize(
-    ("prepare", "commands"),
-    [
-        (fresh, READERS),
-        (of_the_first_format, READERS),
-        (with_kept_results, READERS),
-        (interrupted, COMMANDS),
-        (emptied_log, READERS),
-        (read_only, READERS),
-        (read_only_folder, COMMANDS),
-    ],
-)
+STATES = {
+    "fresh": (lambda _: None, READERS),
+    "of the first format": (lambda session: outdate(session, 1), READERS),
+    "with kept results": (with_kept_results, READERS),
+    "interrupted": (interrupted, COMMANDS),
+    "with an emptied log": (lambda session: log_beside(session).touch(), READERS),
+    "read-only": (lambda session: session.chmod(0o400), READERS),
+    "in a read-only folder": (lambda session: session.parent.chmod(0o500), COMMANDS),
+}
+
+
+@pytest.mark.parametrize(("prepare", "commands"), STATES.values(), ids=STATES)
 def test_reading_alters_nothing(prepare, commands, call, tmp_path):
     folder = tmp_path / "sessions"
     folder.mkdir()
@@ -129,7 +113,7 @@ def test_reading_beside_a_writer_alters_nothing(call, tmp_path):
         for words in read_all(call, session, tmp_path / "out"):
             assert state(folder) == before, words
         writer.stdin.close()
-    assert not session.with_name(session.name + "-wal").exists()
+    assert not log_beside(session).exists()
 
 
 def test_what_an_interrupted_writer_committed_is_read(tmp_path):

@@ -6,7 +6,6 @@ import subprocess
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from functools import partial
 from itertools import count
 from unittest.mock import Mock
 
@@ -17,8 +16,6 @@ from rig.daemon.worker import Worker
 from rig.errors import DeviceError
 from rig.link.client import Device
 from rig.link.port import open_port
-from rig.ports import fill_url
-from rig.protocol import reader
 from rig.recorder.interrupts import Interrupts
 from rig.replay import replay
 from rig.results.whole import calibration, results
@@ -26,12 +23,6 @@ from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.cli import lab
 from tests.waiting import PATIENCE_S, until
-
-
-@pytest.fixture
-def protocol(fence):
-    """What falls is all the same to a recording: bars, whose edges are identified at once."""
-    return fence
 
 
 def stopped(arguments, session, number, wait_s):
@@ -64,7 +55,7 @@ def _holds(lock, pid):
         return False
 
 
-def campaign(folder, numbers, longest_s, seed, pace, text):
+def campaign(numbers, seed, folder, longest_s, pace, text):
     """Stop a campaign by one signal after the other, then let it end; return the session."""
     session = folder / f"{'-'.join(number.name for number in numbers)}-{seed}"
     protocol = session.with_suffix(".yaml")
@@ -92,17 +83,17 @@ def campaign(folder, numbers, longest_s, seed, pace, text):
     return session, ends
 
 
+def campaigns(cases, *given):
+    """Do so with each of several rows of signals, side by side."""
+    with ThreadPoolExecutor(len(cases)) as pool:
+        return [*pool.map(lambda seed: campaign(cases[seed], seed, *given), range(len(cases)))]
+
+
 @pytest.mark.slow
 def test_signals_at_random_moments_of_a_real_time_campaign_cost_no_run(tmp_path):
     int_, term, kill = signal.SIGINT, signal.SIGTERM, signal.SIGKILL
     cases = [(int_, term), (kill, kill), (term, kill, int_)]
-    text = lab.short("40 deg", 3, "0.2 s")
-    with ThreadPoolExecutor(len(cases)) as pool:
-        made = list(
-            pool.map(
-                lambda case: campaign(tmp_path, case[1], 3.0, case[0], 1, text), enumerate(cases)
-            )
-        )
+    made = campaigns(cases, tmp_path, 3.0, 1, lab.short("40 deg", 3, "0.2 s"))
     for (_, ends), numbers in zip(made, cases, strict=True):
         assert ends[0] in {130, -kill}, f"{numbers}: none was stopped"
     for session, ends in made:
@@ -120,21 +111,11 @@ def test_signals_at_random_moments_of_a_real_time_campaign_cost_no_run(tmp_path)
 
 def test_signals_at_random_moments_of_a_fast_campaign_cost_no_run(tmp_path):
     """In virtual time nearly every moment is one of work, not of waiting."""
-    cases, text = [(signal.SIGTERM,), (signal.SIGKILL,)], lab.short_fence(3)
-    with ThreadPoolExecutor(2) as pool:
-        made = pool.map(
-            lambda case: campaign(tmp_path, case[1], 0.25, case[0], 0, text), enumerate(cases)
-        )
-        assert any(code in {130, -signal.SIGKILL} for _, ends in made for code in ends)
+    made = campaigns([(signal.SIGTERM,), (signal.SIGKILL,)], tmp_path, 0.25, 0, lab.short_fence(3))
+    assert any(code in {130, -signal.SIGKILL} for _, ends in made for code in ends)
 
 
 # ------------------------------------------------- moments that chance would seldom choose
-
-
-@pytest.fixture
-def run(call, tmp_path, protocol):
-    words = ("run", protocol, "--port", "sim://?seed=1", "--session", tmp_path / "s")
-    return partial(call, *words)
 
 
 @pytest.mark.parametrize(
@@ -270,20 +251,6 @@ def test_a_process_in_the_background_goes_on_ignoring_ctrl_c():
 # ------------------------------------------------- what the board is left with
 
 
-@pytest.fixture
-def new(tmp_path, protocol):
-    """Make a session and the URL of its simulation."""
-    scene = reader.read(str(protocol))
-
-    def make(name="s"):
-        path = tmp_path / name
-        url = fill_url("sim://", protocol, path, 1)
-        session = Session.create(path, scene.text, protocol.name, simulated=True, origin=url)
-        return session, url, scene
-
-    return make
-
-
 @pytest.fixture(params=["board goes on", "board restarts"])
 def one_board(request, monkeypatch):
     """Have one board behind the port, which opening restarts or not, as boards differ.
@@ -336,10 +303,10 @@ def test_a_drop_that_a_restart_cut_short_is_made_again(run, tmp_path, monkeypatc
 
 @pytest.mark.parametrize("one_board", ["board restarts"], indirect=True)
 def test_a_drop_of_another_session_is_neither_taken_nor_discarded(
-    call, run, tmp_path, protocol, monkeypatch, one_board
+    call, run, tmp_path, fence, monkeypatch, one_board
 ):
     def other(name, **ends):
-        words = ("run", protocol, "--port", "sim://", "--session", tmp_path / name)
+        words = ("run", fence, "--port", "sim://", "--session", tmp_path / name)
         return call(*words, "--seed", 1, **ends)
 
     other("older")

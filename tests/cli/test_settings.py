@@ -7,7 +7,7 @@ import pytest
 from rig.analysis.owners import suffixes
 from rig.protocol.plan import runs
 from rig.protocol.reader import parse, read
-from tests.cli.lab import PROTOCOLS, record, short, truth_of, without
+from tests.cli.lab import PROTOCOLS, record, short, truth_of
 
 HEIGHTS = [f"drop {height} mm ± 1 mm" for height in (900, 1200, 1600)]
 CHAINS = ["drop 180 mm", "drop 228.5 mm"]
@@ -25,14 +25,14 @@ def balls(tmp_path_factory):
     """Two sessions of the same plan, of the same rig and of another."""
     folder, text = tmp_path_factory.mktemp("balls"), (PROTOCOLS / "falling-ball.yaml").read_text()
     values = ", ".join(setting.removeprefix("drop ") for setting in HEIGHTS)
-    text = vary(f"{{drop: [{values}]}}", without("drop", text)).replace("repeats: 10", "repeats: 4")
+    text = vary(f"{{drop: [{values}]}}", text, "drop").replace("repeats: 10", "repeats: 4")
     return [record(folder, text, f"sim://?stated=1&seed={n}", f"b{n}") for n in range(2)]
 
 
 @pytest.fixture(scope="module")
 def chains(tmp_path_factory):
     """Two chains at 40°, from two heights a rod's distance apart."""
-    text = vary("{drop: [180 mm, 228.5 mm]}", without("drop", short("40 deg", 4)))
+    text = vary("{drop: [180 mm, 228.5 mm]}", short("40 deg", 4), "drop")
     return record(tmp_path_factory.mktemp("chains"), text, "sim://?stated=1&seed=3")
 
 
@@ -100,8 +100,8 @@ def test_unknowns_are_shared_by_settings_that_state_the_same():
     first = [{}, {}, *[{"start": " (drop 228.5 mm, surface.friction 0.1)"}] * 2]
     assert [suffixes(protocol, run) for run in runs(protocol)] == first
     ball = (PROTOCOLS / "falling-ball.yaml").read_text("utf-8")
-    text = vary("{drag.terminal_speed: [60 m/s, 50 m/s]}", f"{without('drag', ball)}drag: {{}}")
-    protocol = parse(text)
+    text = vary("{drag.terminal_speed: [60 m/s, 50 m/s]}", ball, "drag")
+    protocol = parse(f"{text}drag: {{}}\n")
     assert {owner for run in runs(protocol) for owner in suffixes(protocol, run)} == {"air"}
     assert suffixes(read(PROTOCOLS / "falling-ball.yaml"), runs(protocol)[0]) == {}
 

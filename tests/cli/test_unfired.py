@@ -1,6 +1,5 @@
 """A device that will not arm or fire costs time, and never a run."""
 
-from functools import partial
 from itertools import count
 
 import pytest
@@ -13,12 +12,6 @@ from rig.session.store import Session
 from tests.cli.lab import assert_whole, drops_of, log_of, truth_of
 
 ARMED, FIRED, INTERRUPTED = RunState.ARMED, RunState.FIRED, RunState.INTERRUPTED
-
-
-@pytest.fixture
-def run(call, tmp_path, fence):
-    words = ("run", fence, "--port", "sim://?seed=1", "--session", tmp_path / "s", "--yes")
-    return partial(call, *words)
 
 
 @pytest.fixture
@@ -46,10 +39,6 @@ def flicker(port):
     port.board.touch(0)
 
 
-def block(port):
-    port.board.touch(1 << 1)
-
-
 def press_stop(port):
     port.board.stop(True)
     port.clock.sleep(1e-3)  # longer than any spike
@@ -57,16 +46,13 @@ def press_stop(port):
     port.board.stop(False)
 
 
-def stay_away(port):
-    port.clock.sleep(0.3)
-
-
 HAPPENINGS = [
     (flicker, "gate 1 changed after arming"),
-    (block, "gate 1 is blocked"),
+    (lambda port: port.board.touch(1 << 1), "gate 1 is blocked"),
     (press_stop, "the device disarmed itself: the emergency stop was opened"),
-    (stay_away, "the device disarmed itself: this program was silent for too long"),
-]
+    (lambda port: port.clock.sleep(0.3),
+     "the device disarmed itself: this program was silent for too long"),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("happen", "why"), HAPPENINGS)

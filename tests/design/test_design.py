@@ -76,20 +76,6 @@ def test_the_forecast_of_coefficients_is_what_the_estimate_then_states(expected)
         assert u == pytest.approx(found[name].u, rel=0.2), name
 
 
-def test_more_runs_tell_more_but_not_of_what_is_common():
-    one, many = (
-        foretold(p, TRUE) for p in (replace(UNIFORM, plan=Plan(INCLINES, n)) for n in (2, 32))
-    )
-    for name in ("restitution", "friction"):
-        assert many.coefficients[name] < 0.5 * one.coefficients[name]
-    for incline in INCLINES:
-        at = Condition(incline)
-        assert many.mean["speed_m_s"][at] < 0.5 * one.mean["speed_m_s"][at]
-        assert many.mean["separation_m"][at] < one.mean["separation_m"][at]
-        # Beam heights are off by as much in every run.
-        assert many.mean["separation_m"][at] > 0.2 * one.mean["separation_m"][at]
-
-
 def test_one_incline_tells_no_friction_and_the_restitution_only_with_it_held():
     """As `rig estimate` has it of such a session."""
     protocol = replace(UNIFORM, plan=Plan((40.0,), 4))

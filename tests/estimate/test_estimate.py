@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from rig.analysis.result import GOOD
-from rig.analysis.session import analyze
 from rig.errors import InputError
 from rig.estimate.coefficients import best, coefficient_problem
 from rig.estimate.hypotheses import one_alpha
@@ -23,10 +22,9 @@ from rig.protocol.reader import parse
 from rig.report.estimate import estimate_text
 from rig.sections import Sections
 from rig.units import Quantity
-from sim.dials import Dials
 from tests.analysis.drops import FENCE, SINGLE, UNIFORM, case
+from tests.analysis.sessions import MILD, cases
 from tests.analysis.sessions import analysis as analyzed
-from tests.analysis.sessions import cases
 from tests.analysis.test_datum_board import BOARD_GRADED
 from tests.estimate.sessions import BETA, MU, analysis, forms
 
@@ -173,16 +171,20 @@ def test_good_drops_that_no_motion_fits_are_left_out_and_named():
         estimate(UNIFORM, replace(drops, adjusted={}))
 
 
-def dropped(protocol, numbers):
-    """Drops of a scene of its own, analysed."""
-    drops = [case(protocol, Dials(skew_sd=1e-3), run=number) for number in numbers]
-    return analyze(protocol, [one.drop for one in drops], lambda _: drops[0].scale)
+def dropped(protocol, inclines, each):
+    """Drops of a scene of its own, analysed: so many at each incline, with A, B, B, A."""
+    at = {
+        incline: [run for run in runs(protocol) if run.incline_deg == incline]
+        for incline in inclines
+    }
+    numbers = [run.number for planned in at.values() for run in planned[:each]]
+    return analyzed([case(protocol, MILD, run=number) for number in numbers])
 
 
 def test_air_that_the_protocol_states_counts_once():
     """For the coefficients, every α and every impulse."""
     protocol = parse(f"{UNIFORM.text}drag: {{terminal_speed: 15 m/s ± 1 m/s}}\n")
-    found = estimate(protocol, dropped(protocol, first(1, protocol, SURFACE))).json()
+    found = estimate(protocol, dropped(protocol, SURFACE, 1)).json()
     for name, truth in (("restitution", 0.5), ("friction", 0.2)):
         measured = parameter(found, name)["least_squares"]
         assert abs(measured["value"] - truth) < 4 * measured["u"]
@@ -194,7 +196,7 @@ def test_air_that_the_protocol_states_counts_once():
 
 def test_the_models_curves_end_at_the_prediction_where_rods_touch_higher_than_the_top_one():
     protocol = parse(f"{BOARD_GRADED.text}drag: {{terminal_speed: 15 m/s}}\n")
-    (curve,) = estimate(protocol, dropped(protocol, first(1, protocol, (40.0,)))).json()["curves"]
+    (curve,) = estimate(protocol, dropped(protocol, (40.0,), 1)).json()["curves"]
     expected = predict_incline(protocol, 40.0, "A")
     assert curve["speed2_m2_s2_model"][-1] == pytest.approx(expected.speed_m_s**2)
     assert curve["separation_m_model"][-1] == pytest.approx(expected.separation_m, rel=1e-3)
@@ -203,10 +205,7 @@ def test_the_models_curves_end_at_the_prediction_where_rods_touch_higher_than_th
 def test_inclines_outside_the_model_tell_no_coefficient():
     """At 10° a rod with μ 0.2 does not slide."""
     protocol = replace(UNIFORM, surface=replace(UNIFORM.surface, pile=None))
-    first = {run.incline_deg: run.number for run in reversed(runs(protocol))}
-    found = estimate(
-        protocol, dropped(protocol, [first[incline] for incline in (0.0, 10.0, 50.0)])
-    ).json()
+    found = estimate(protocol, dropped(protocol, (0.0, 10.0, 50.0), 1)).json()
     assert any(said.startswith("10° tells no coefficient") for said in found["left_out"])
     assert len(found["alpha"]["inclines"]) == 3
     # With level ground, which has no friction, one incline is enough.
@@ -237,21 +236,12 @@ def test_a_quantile_of_a_distribution_narrower_than_floats_ends():
     assert narrow.summary("x")["high"] == pytest.approx(0.5, abs=1e-15)
 
 
-def first(count, protocol, inclines):
-    """Numbers of some runs at each incline, A, B, B, A."""
-    at = {
-        incline: [r.number for r in runs(protocol) if r.incline_deg == incline]
-        for incline in inclines
-    }
-    return [number for numbers in at.values() for number in numbers[:count]]
-
-
 def test_chains_with_an_alpha_of_their_own_are_told_apart():
     """A by the surface and B given, exactly; then both given, and neither is the mean of both."""
     a, b = UNIFORM.chains["A"], UNIFORM.chains["B"]
     given = replace(b, chain=replace(b.chain, alpha=Quantity(0.25)))
     one = replace(UNIFORM, chains={"A": a, "B": given})
-    found = estimate(one, dropped(one, first(2, one, SURFACE))).json()
+    found = estimate(one, dropped(one, SURFACE, 2)).json()
     assert "failed" not in found
     assert {line["name"] for line in found["parameters"]} == {"alpha", "restitution", "friction"}
     alpha = parameter(found, "alpha")["least_squares"]
@@ -262,7 +252,7 @@ def test_chains_with_an_alpha_of_their_own_are_told_apart():
     other = replace(a, chain=replace(a.chain, alpha=Quantity(0.15, 0.02)))
     given = replace(b, chain=replace(b.chain, alpha=Quantity(0.25, 0.02)))
     two = replace(UNIFORM, chains={"A": other, "B": given}, priors=LIKE)
-    both = estimate(two, dropped(two, first(4, two, (50.0,))))
+    both = estimate(two, dropped(two, (50.0,), 4))
     for name, truth in (("alpha A", 0.15), ("alpha B", 0.25)):
         measured = parameter(both.json(), name)["least_squares"]
         assert abs(measured["value"] - truth) < 4 * measured["u"] < 0.02

@@ -13,7 +13,7 @@ import pytest
 
 from rig import cli
 from rig.analysis.curves import model_curves
-from rig.analysis.result import Audit, DropResult, Measured
+from rig.analysis.result import Measured
 from rig.measurands import SEPARATION
 from rig.predictions import predict_incline
 from rig.protocol import reader
@@ -33,7 +33,7 @@ from rig.report.looks import COLORS, PARTS
 from rig.report.mounting import beam_ends, mounting_figure
 from rig.report.plot import drawing_file, page_svg, plot, style
 from sim.dials import Dials
-from tests.analysis.drops import PROTOCOLS, UNIFORM, case
+from tests.analysis.drops import PROTOCOLS, UNIFORM, case, made_up
 from tests.analysis.test_datum_board import BOARD_GRADED
 from tests.report import fake_analysis
 from tests.tables import cases
@@ -110,7 +110,7 @@ def test_figures_follow_the_scene():
     assert runs_figure(fake_analysis.gravity()) is None
     gravity = result_figure(fake_analysis.gravity(), {})
     assert [panel.x.label for panel in gravity.panels] == ["run"]
-    void = DropResult(Run(1, 40.0, "A", "B"), 1, "void", (), Audit(0, 0, 50, 0, 0))
+    void = made_up(Run(1, 40.0, "A", "B"), "void")
     for analysis in (fake_analysis.EMPTY, fake_analysis.analysis([void], [])):
         assert result_figure(analysis, CURVES) is None
         assert runs_figure(analysis) is None

@@ -4,7 +4,7 @@ import re
 from dataclasses import replace
 from types import SimpleNamespace
 
-from rig.analysis.result import Audit, DropResult, Measured
+from rig.analysis.result import Measured
 from rig.analysis.session import Analysis
 from rig.protocol import reader
 from rig.protocol.plan import runs as planned_runs
@@ -18,6 +18,7 @@ from rig.session.reading import StateEntry
 from rig.session.schema import RunState
 from rig.units import Quantity
 from rig.wordings import OPERATOR, SENTENCE, WORDINGS, Severity
+from tests.analysis.drops import made_up
 from tests.cli.lab import PROTOCOLS
 from tests.report import fake_analysis
 
@@ -65,8 +66,7 @@ def test_a_card_has_at_most_three_numbers():
 
 def test_a_finding_of_nothing_says_so():
     assert finding(fake_analysis.EMPTY) == "No run was recorded."
-    void = DropResult(Run(1, 40.0, "A", "B"), 1, "void", (), Audit(0, 0, 50, 0, 0))
-    told = finding(fake_analysis.analysis([void], []))
+    told = finding(fake_analysis.analysis([void(1, 1)], []))
     assert told == "1 run, 1 drop, 1 void. No mean can be given."
     told = finding(fake_analysis.gravity())
     assert told.endswith("g agrees with the protocol's gravity, within U.")
@@ -76,7 +76,7 @@ def test_a_finding_of_nothing_says_so():
 def test_departures_from_the_plan_are_named():
     protocol = reader.read(PROTOCOLS / "single-chain.yaml")
     planned = planned_runs(protocol)
-    made = [DropResult(run, 1, "accepted", (), Audit(4, 4, 0, 0, 0)) for run in planned]
+    made = [made_up(run) for run in planned]
     whole = fake_analysis.analysis(made, [])
     assert deviations(protocol, whole, [entry(run.number) for run in planned]) == [NONE]
     parted = replace(
@@ -109,10 +109,7 @@ EDGES = (Edge(100, 0, True), Edge(200, 0, False), Edge(250, 1, False), Edge(400,
 
 def test_a_timeline_has_a_lane_for_each_gate_and_a_bar_for_each_shadow():
     drop = Drop(1, 1, 1000, EDGES, fire_tick=0, initial_state=0b10)
-    matches = {0: 0, 1: 0, 2: 0, 3: 0}
-    result = DropResult(
-        Run(1, 40.0, "A", "B"), 1, "marginal", (), Audit(5, 4, 0, 1, 0), {}, matches
-    )
+    result = replace(void(1, 1), rods=(0, 0, 0, 0, -1))
     shared = lanes(GATES, [(drop, 1000, result)])
     assert [gate.channel for gate in shared.gates] == [0, 1, 8]  # from the top, impact first
     # 1280 steps for 500 ms: from 100 to 200 and what is not over; blocked from the start.
@@ -122,17 +119,16 @@ def test_a_timeline_has_a_lane_for_each_gate_and_a_bar_for_each_shadow():
 
 
 def test_imported_edges_begin_where_they_begin():
-    result = DropResult(Run(1, 40.0, "A", None), 1, "void", (), Audit(5, 0, 0, 5, 0))
     late = Drop(1, 1, 1000, tuple(edge._replace(tick=edge.tick + 10_000) for edge in EDGES))
-    drop = late, 1000, result
+    drop = late, 1000, void(1, 1)
     drawn = timeline(lanes(GATES, [drop]), *drop)
     assert drawn.bars.startswith("M0 15m0 0h320m")  # 100 of 400 ms
     assert not drawn.odd  # nothing was fitted, so nothing is odd
 
 
 def void(run, attempt, *reasons, verdict="void"):
-    planned = Run(run, 40.0, "A", "B")
-    return DropResult(planned, attempt, verdict, reasons, Audit(0, 0, 0, 0, 0))
+    drop = made_up(Run(run, 40.0, "A", "B"), verdict)
+    return replace(drop, attempt=attempt, reasons=reasons)
 
 
 SKEW = make_reason("release_skew", skew_s=9.19e-3, limit_s=5e-3)

@@ -17,16 +17,16 @@ from rig.analysis.summary import Incline
 from rig.clock.calibration import TimeScale
 from rig.protocol.protocol import Condition
 from rig.reasons import make_reason, plain_reason
-from rig.records import Job
 from rig.results.blind import veiled_drop
 from rig.results.improvements import improvements
 from rig.results.known_drops import KnownDrops
 from rig.results.live import LiveAnalysis
-from rig.results.whole import calibration, complete_analysis, results
+from rig.results.whole import complete_analysis, results
 from rig.session.schema import RunState
 from rig.session.store import Session
 from sim.dials import Dials
 from tests.analysis.drops import UNIFORM, case
+from tests.analysis.sessions import analysis
 from tests.cli.lab import record, short
 
 
@@ -88,27 +88,6 @@ def test_the_first_reading_of_a_session_whose_results_are_kept_has_them_all(sess
         assert pairs[0] == pairs[1]
 
 
-def test_results_that_are_kept_have_the_whole_calibration(session):
-    """Also how a clock's rate changed in time, by which edges are exported."""
-    with Session.open(session, readonly=True) as opened:
-        cold, kept = results(opened, fresh=True), results(opened)
-        assert cold.complete
-        assert not kept.complete
-        clock = calibration(opened)
-        for drop in opened.drops():
-            assert cold.clock.scale(drop) == kept.clock.scale(drop) == clock.scale(drop)
-
-
-def test_a_rejected_drop_keeps_the_verdict_of_its_limits(session):
-    reject(session, 6)
-    view = LiveAnalysis(session).read()
-    result = view.results[Job(6, 1)]
-    assert (result.verdict, result.limits) == ("rejected", "accepted")
-    assert view.fitted == 0
-    assert view.analysis.with_rejected
-    assert view.analysis.effects
-
-
 def test_a_drop_is_judged_as_it_is_read(session):
     live = LiveAnalysis(session)
     view = live.read()
@@ -136,20 +115,16 @@ def test_a_drop_that_was_read_by_a_younger_clock_is_not_read_again(session, monk
 PLAN = replace(UNIFORM.plan, inclines=(40.0,), repeats=8)
 
 
-def analysis(protocol):
-    drops = [case(replace(UNIFORM, plan=PLAN), Dials(), seed=4, run=run) for run in range(1, 9)]
-    return analyze(protocol, [one.drop for one in drops], lambda _: drops[0].scale)
-
-
 def test_what_is_measured_better_brings_at_least_what_was_promised():
     stated, better = (
         replace(UNIFORM, plan=PLAN, gates=replace(UNIFORM.gates, datum_u=u)) for u in (6e-4, 6e-5)
     )
-    summary = analysis(stated).summary
+    drops = [case(replace(UNIFORM, plan=PLAN), Dials(), seed=4, run=run) for run in range(1, 9)]
+    summary = analysis(drops, stated).summary
     (promised,) = (one for one in improvements(summary) if one.line in {"datum", "beam heights"})
     name = promised.measurand.name
     assert (promised.line, promised.now) == ("datum", summary[0].means[name].expanded)
-    (again,) = analysis(better).summary
+    (again,) = analysis(drops, better).summary
     # Scatter that was found moves a little with it.
     assert again.means[name].expanded < 1.02 * promised.then < 1.02 * promised.now
     assert promised.sentence.startswith("If the ")

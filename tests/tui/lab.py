@@ -98,6 +98,25 @@ async def at_screen(options: Options, size=(80, 24), **of_client: Any) -> AsyncI
         yield Operator(app, pilot)
 
 
+@asynccontextmanager
+async def listening(op: Operator) -> AsyncIterator[list[str]]:
+    """Hear what the daemon is asked for, and what it has answered."""
+    connection = op.app.client.connection
+    called, real = [], connection.call
+
+    async def call(method: str, **params: Any) -> Any:
+        if method == "renew":
+            return await real(method)
+        called.append(method)
+        answer = await real(method, **params)
+        called.append(f"{method} answered")
+        return answer
+
+    connection.call = call
+    yield called
+    connection.call = real
+
+
 @dataclass
 class Lab:
     """One bench with its daemon."""
@@ -126,6 +145,12 @@ class Lab:
         self.daemons.append(daemon)
         assert daemon.stderr is not None
         assert daemon.stderr.readline().startswith(b"rig daemon: ")
+
+    def restart(self) -> None:
+        """End it, and start one that is otherwise."""
+        self.stop()
+        self.daemons.clear()
+        self.start()
 
     def kill(self) -> None:
         """Kill it as a crash would."""

@@ -1,6 +1,5 @@
 """STOP everywhere: in every dialog, while typing, and in every state that lasts."""
 
-from contextlib import asynccontextmanager
 from dataclasses import replace
 
 from textual.widgets import Input
@@ -8,26 +7,7 @@ from textual.widgets import Input
 from rig.campaign.machine import Stage
 from rig.session.store import Session
 from rig.tui.widgets.dialogs import Ask, Confirm, TextDialog
-from tests.tui.lab import DAEMON
-
-
-@asynccontextmanager
-async def listening(op):
-    """Hear what the daemon is asked for."""
-    connection = op.app.client.connection
-    called, real = [], connection.call
-
-    async def call(method, **params):
-        if method == "renew":
-            return await real(method)
-        called.append(method)
-        answer = await real(method, **params)
-        called.append(f"{method} answered")
-        return answer
-
-    connection.call = call
-    yield called
-    connection.call = real
+from tests.tui.lab import DAEMON, listening
 
 
 async def stops(op, key):
@@ -81,10 +61,8 @@ Controller.stop = late
 
 
 async def test_stop_is_asked_for_until_it_is_known_that_all_is_off(lab, monkeypatch):
-    lab.stop()
-    lab.daemons.clear()
     monkeypatch.setattr("tests.tui.lab.DAEMON", _HELD_UP + DAEMON)
-    lab.start()
+    lab.restart()
 
     async with lab.ready() as op:
         await op.press("ctrl+p")
@@ -98,10 +76,8 @@ async def test_stop_is_asked_for_until_it_is_known_that_all_is_off(lab, monkeypa
 
 
 async def test_stop_works_in_every_state_that_lasts(lab):
-    lab.stop()
-    lab.daemons.clear()
     lab.url += "&pace=1"
-    lab.start()
+    lab.restart()
 
     async with lab.ready(countdown_s=600.0) as op:
         for stage, key, said in (

@@ -18,7 +18,7 @@ from rig.tui.survey import session_list
 from rig.tui.widgets.text import Words
 from rig.wordings import NOTE
 from tests.cli.lab import short
-from tests.tui.lab import PATIENCE_S, at_screen, flat
+from tests.tui.lab import PATIENCE_S, at_screen, flat, listening
 
 KEYS_AT_MOST = 4
 
@@ -213,13 +213,6 @@ async def test_a_protocol_and_stop_are_clicked(lab, fence):
             return "The other one" in flat(op.app)
 
         await op.until(chosen)
-        stopped = []
-        real = op.app.client.connection.call
-
-        async def call(method, **params):
-            stopped.append(method)
-            return await real(method, **params)
-
-        op.app.client.connection.call = call
-        await click(op, "app.do('stop')")
-        await op.until(lambda: "stop" in stopped)
+        async with listening(op) as called:
+            await click(op, "app.do('stop')")
+            await op.until(lambda: "stop" in called)

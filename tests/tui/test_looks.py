@@ -64,11 +64,14 @@ def test_a_screen_looks_as_it_did(moment, looks):
         for text in asyncio.run(_screens(moment, sizes, looks, lambda app: [text_of(app)]))
     ]
     for (columns, lines), text in zip(SIZES, texts, strict=True):
-        golden = GOLDENS / f"{moment}-{columns}x{lines}.txt"
-        if os.environ.get("GOLDENS") == "write":
-            GOLDENS.mkdir(exist_ok=True)
-            golden.write_text(text + "\n", "utf-8")
-        assert text + "\n" == golden.read_text("utf-8"), golden.name
+        compare(f"{moment}-{columns}x{lines}", text)
+
+
+def compare(name, text):
+    golden = GOLDENS / f"{name}.txt"
+    if os.environ.get("GOLDENS") == "write":
+        golden.write_text(text + "\n", "utf-8")
+    assert text + "\n" == golden.read_text("utf-8"), golden.name
 
 
 READABLE = 4.5
@@ -137,10 +140,7 @@ def test_all_pages_look_as_they_did(recorded):
     found = list(seen(session, KEYS, files, SIZES, ["dark"], text_of))
     assert [name for name, size, *_ in found if size == SIZES[0]] == PAGES
     for name, (columns, lines), _, text in found:
-        golden = GOLDENS / f"page-{name}-{columns}x{lines}.txt"
-        if os.environ.get("GOLDENS") == "write":
-            golden.write_text(text + "\n", "utf-8")
-        assert text + "\n" == golden.read_text("utf-8"), golden.name
+        compare(f"page-{name}-{columns}x{lines}", text)
 
 
 def test_pictures_say_that_they_are_simulated_and_need_no_server(recorded, tmp_path, monkeypatch):

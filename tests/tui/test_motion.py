@@ -1,7 +1,6 @@
 """From edges to heights, live and matched; the tape of the history page; plots on their dots."""
 
 from itertools import pairwise
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,55 +17,25 @@ from rig.tui.braille import dots_of
 from rig.tui.motion import motions
 from rig.tui.plotting import Picture, axis_over, draw_picture
 from rig.tui.replay import FASTEST, SLOWEST, Player, end_of, indicators_at, until
+from sim.dials import Dials
+from tests.analysis.drops import case
 from tests.cli.lab import short
 
-HZ = 1e6
-DELAY_S = 0.02
+DELAY_S = 0.02  # of the simulated release
 
 
-@pytest.fixture(scope="module")
-def scene():
-    return reader.parse(short())
-
-
-def edges_of(scene, run):
-    """Edges of the model's own fall, let go `DELAY_S` after the fire stamp, and their rods."""
-    found = []
-    for motion in motions(scene, run):
-        name = run.impact if motion.role == "impact" else run.free
-        chain = scene.chains[name]
-        for gate in scene.gates.on(motion.role):
-            for rod, place in enumerate(chain.chain.heights):
-                for blocked in (True, False):
-                    half = chain.widths[rod] / 2 * (1 if blocked else -1)
-                    level = gate.height - place + half
-                    if level >= scene.drop.value or (motion.role == "impact" and level <= -place):
-                        continue
-                    time = float(motion.model.times(np.array([level]))[0]) + DELAY_S
-                    found.append((Edge(round(time * HZ), gate.channel, blocked), rod))
-    return sorted(found)
-
-
-def recorded(run, pairs):
-    """A drop of these edges, and what an analysis says that they are."""
-    edges = tuple(edge for edge, _ in pairs)
-    matches = {number: rod for number, (_, rod) in enumerate(pairs)}
-    result = SimpleNamespace(run=run, matches=matches, quantities={})
-    return Drop(run.number, 1, HZ, edges), HZ, result
-
-
-def test_points_lie_on_the_models_curve(scene):
-    run = runs(scene)[0]
-    both = motions(scene, run, recorded(run, edges_of(scene, run)))
-    assert [one.role for one in both] == ["impact", "free"]
-    for one in both:
-        assert one.delay_s == pytest.approx(DELAY_S, abs=1e-3)
-        assert one.times.size > 100
-        there = one.model.heights(one.times - one.delay_s)[0]
-        assert np.abs(there - one.heights).max() < 3e-3
-        assert one.measured_height(0.0) is None
-        last = float(one.times[-1])
-        assert one.measured_height(last) == pytest.approx(one.model_height(last), abs=3e-3)
+def test_points_lie_on_the_models_curve():
+    one = case(reader.parse(short()), Dials.quiet(), run=1)
+    both = motions(one.protocol, one.run, (one.drop, one.scale.hz, one.analyze()))
+    assert [motion.role for motion in both] == ["impact", "free"]
+    for motion in both:
+        assert motion.delay_s == pytest.approx(DELAY_S, abs=1e-3)
+        assert motion.times.size > 100
+        there = motion.model.heights(motion.times - motion.delay_s)[0]
+        assert np.abs(there - motion.heights).max() < 3e-3
+        assert motion.measured_height(0.0) is None
+        last = float(motion.times[-1])
+        assert motion.measured_height(last) == pytest.approx(motion.model_height(last), abs=3e-3)
 
 
 def test_a_ball_is_shown_until_it_has_passed_its_last_gate():
