@@ -38,9 +38,8 @@ _ROUNDS = 60  # few drops need many rounds, as they determine the scatter poorly
 _REMATCH = 2
 """Rounds after which all edges are matched again with improved beams and rods; from then on,
 alternating steps are damped."""
-_DONE = 0.02  # last step, in standard uncertainties
+_DONE = 0.02  # last step, in standard uncertainties, and last relative change of the components
 _SHORTEST = 1e-6  # least share of a step before the fit fails
-_STEADY = 0.02  # relative change of the components
 _LEAST = {"floor": 5e-6, "departure": 5e-6, "few": 5e-6}
 """Components, m, below which others of the same variance dominate."""
 
@@ -294,4 +293,4 @@ def _steady(old: Components, new: Components, groups: Sequence[DropGroup]) -> bo
         for alpha in alphas
         for a, b in zip(old.impulses(alpha, ends), new.impulses(alpha, ends), strict=True)
     ]
-    return all(abs(a - b) <= _STEADY * max(b, least) for a, b, least in pairs)
+    return all(abs(a - b) <= _DONE * max(b, least) for a, b, least in pairs)
