@@ -226,7 +226,7 @@ def strike_u(record: ChainRecord, protocol: Protocol) -> Array:
     fallen = np.maximum(protocol.drop.value + record.strikes, 0.0)
     carried = protocol.priors.swing * share * np.sqrt(2.0 * fallen / protocol.gravity.value)
     lower = np.minimum(carried * math.tan(math.radians(record.incline_deg)), fallen)
-    return np.hypot(u, lower)
+    return np.asarray(np.hypot(u, lower), dtype=np.float64)
 
 
 def swing_sd(chain: Chain, protocol: Protocol) -> float:
