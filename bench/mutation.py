@@ -58,7 +58,7 @@ ROOMS = {
     "core": ("firmware/core",),
 }
 """Where faults are put."""
-CORE_TESTS = "tests/firmware/test_core.py"
+CORE_TESTS = "tests/firmware/test_avr.py"
 LEAST_KILLED = 0.9
 _HEAD = """\
 # Faults put into the source

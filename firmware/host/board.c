@@ -38,7 +38,7 @@ static uint64_t interrupt_free, flagged;
 static uint8_t *tail, *stop;
 static uint8_t half;
 static uint8_t outputs;
-static bool stopped, fired, lamp;
+static bool stopped;
 static uint64_t fire_at, sense_after, release_end;
 static uint64_t references[REFERENCES];
 static uint8_t reference_first, reference_end;
@@ -151,7 +151,6 @@ uint16_t board_fire(uint8_t release, uint32_t ticks)
 {
     outputs = (uint8_t)(release | SYNC);
     release_end = now + ticks;
-    fired = true;
     fire_at = now;
     return board_count();
 }
@@ -211,7 +210,7 @@ uint8_t board_send(const uint8_t *bytes, uint8_t count)
 
 void board_led(bool on)
 {
-    lamp = on;
+    (void)on;
 }
 
 void board_kick(void)
@@ -295,19 +294,13 @@ static void gates_until(uint64_t until)
 
 uint64_t host_run(uint64_t until)
 {
-    fired = false;
-    while (now + HOST_TURN <= until && !fired) {
+    while (now + HOST_TURN <= until) {
         gates_until(now + HOST_TURN);
         if (now >= release_end)
             board_release_off();
         device_pass();
     }
     return now;
-}
-
-uint64_t host_fired(void)
-{
-    return fired ? fire_at : 0;
 }
 
 bool host_change(uint64_t when, uint8_t gate, bool blocked)
@@ -318,14 +311,6 @@ bool host_change(uint64_t when, uint8_t gate, bool blocked)
     changes.gate[changes.end % CHANGES] = gate;
     changes.blocked[changes.end++ % CHANGES] = blocked;
     return true;
-}
-
-void host_gates(uint16_t mask)
-{
-    uint8_t gate;
-    changes.first = changes.end;
-    for (gate = 0; gate < BOARD_GATES; gate++)
-        change(gate, mask >> gate & 1);
 }
 
 bool host_feed(uint64_t when, uint8_t byte)
@@ -339,11 +324,6 @@ int host_take(uint64_t *when)
         return -1;
     *when = to_host.when[to_host.first % LINE];
     return to_host.byte[to_host.first++ % LINE];
-}
-
-uint64_t host_next_byte(void)
-{
-    return to_host.first == to_host.end ? 0 : to_host.when[to_host.first % LINE];
 }
 
 void host_stop(bool open)
@@ -369,17 +349,6 @@ uint8_t host_outputs(void)
     return (uint8_t)(outputs & ~SYNC);
 }
 
-void host_preset(uint32_t tick)
-{
-    base = tick - now;
-    ticks_start(tick);
-}
-
-bool host_recording(void)
-{
-    return outputs & SYNC;
-}
-
 void host_reset(uint8_t cause)
 {
     to_device.first = to_device.end;
@@ -387,16 +356,6 @@ void host_reset(uint8_t cause)
     to_host.free = to_device.free = now;
     changes.first = changes.end;
     device_start(cause);
-}
-
-bool host_lamp(void)
-{
-    return lamp;
-}
-
-void host_forget(uint8_t byte)
-{
-    memset(__start_kept, byte, (uintptr_t)__stop_kept - (uintptr_t)__start_kept);
 }
 
 void host_power(uint32_t tick)
@@ -409,6 +368,6 @@ void host_power(uint32_t tick)
     reference_first = reference_end = 0;
     interrupt_free = 0;
     memset(name, 0xFF, sizeof name);
-    host_forget(0xA5);
+    memset(__start_kept, 0xA5, (uintptr_t)__stop_kept - (uintptr_t)__start_kept);
     host_reset(1);
 }

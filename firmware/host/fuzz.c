@@ -2,12 +2,14 @@
  * takes length-prefixed inputs (u32, little-endian) from standard input and prints for each how
  * often the release went on.
  *
- * An input is a script: bytes on the line, frames with a right CRC around any content, gates that
- * move, time that passes, resets, the emergency stop. Whatever it says, the release may be on only
- * during a recording that FIRE began, not longer than its bound, and never while stopped. */
+ * An input is a script: bytes on the line, frames with a right CRC around any content, FIRE and
+ * ACKNOWLEDGE with what the device has said, gates that move, time that passes, resets, the
+ * emergency stop. Whatever it says, the release may be on only during a recording that FIRE began,
+ * not longer than its bound, and never while stopped. */
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 #include "board.h"
 #include "checks.h"
@@ -19,7 +21,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
 static uint64_t now, on_since;
 static bool open_stop;
-static uint8_t token[4];
+static uint8_t token[4], held[8]; /* of ARMED; label and CRC of the latest certificate */
 static unsigned pulses; /* how often the release went on */
 
 #define LONGEST ((uint64_t)RELEASE_MAX_US * 16 + 20 * HOST_TURN)
@@ -35,7 +37,8 @@ static void check(void)
         abort();
 }
 
-/* The frame that ends now, if it is ARMED: without its token nothing could ever be fired. */
+/* The frame that ends now, if it is ARMED or a certificate: without what it says nothing could be
+ * fired, or given up. */
 static void listen(uint8_t byte)
 {
     static uint8_t raw[256], size;
@@ -52,6 +55,9 @@ static void listen(uint8_t byte)
     if (at >= 7 && body[0] == MSG_ARMED)
         for (n = 0; n < 4; n++)
             token[n] = body[3 + n];
+    if (at >= 3 + DROP_CERTIFICATE2_OVERFLOWS && body[0] == MSG_DROP_CERTIFICATE2)
+        for (n = 0; n < 4; n++)
+            held[n] = body[3 + n], held[4 + n] = body[3 + DROP_CERTIFICATE2_CRC32 + n];
 }
 
 static void run(uint64_t ticks)
@@ -116,8 +122,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
                 feed(*data++);
             break;
         case 2: {
-            uint8_t fire[7] = {MSG_FIRE, value, 0, token[0], token[1], token[2], token[3]};
-            frame(fire, sizeof fire);
+            uint8_t body[11] = {amount ? MSG_ACKNOWLEDGE : MSG_FIRE, value};
+            memcpy(body + 3, amount ? held : token, amount ? sizeof held : sizeof token);
+            frame(body, amount ? 11 : 7);
             run(20000);
             break;
         }

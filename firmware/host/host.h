@@ -11,32 +11,17 @@ void host_power(uint32_t tick);
 /* Reset: the kept memory stays. */
 void host_reset(uint8_t cause);
 
-/* The kept memory is lost: each of its bytes is this one. */
-void host_forget(uint8_t byte);
-
-/* Run until a moment, or until FIRE was executed: returns where it stopped. */
+/* Run until a moment; returns where it stopped. */
 uint64_t host_run(uint64_t until);
-
-/* When FIRE was executed, if that is what ended the latest run; else 0. */
-uint64_t host_fired(void);
 
 /* Have a gate change; in order of time, at most 8192 ahead. False when there is no room. */
 bool host_change(uint64_t when, uint8_t gate, bool blocked);
-
-/* Set all gates now. */
-void host_gates(uint16_t gates);
 
 /* A byte begins to arrive not before `when`. False when there is no room. */
 bool host_feed(uint64_t when, uint8_t byte);
 
 /* Take the next byte the device has sent by now; -1 when there is none. */
 int host_take(uint64_t *when);
-
-/* When the next such byte is complete, 0 when none is on its way. */
-uint64_t host_next_byte(void);
-
-/* Set the 32-bit time. */
-void host_preset(uint32_t tick);
 
 /* The reference gives a pulse; at most 16 ahead. */
 void host_reference(uint64_t when);
@@ -46,7 +31,5 @@ void host_sense(uint64_t after_fire);
 
 void host_stop(bool open);
 uint8_t host_outputs(void);
-bool host_recording(void); /* the sync output */
-bool host_lamp(void);
 
 #endif

@@ -18,8 +18,9 @@ from rig_emulator.wiring import BOARDS, Wiring
 from sim.dials import read_dials
 from sim.lab import ChainLab
 from tests.firmware.toolchain import FIRMWARE, make
-from tests.link.bench import Bench, ScriptedLab
+from tests.link.bench import LABEL, Bench, ScriptedLab
 from tests.link.conformance import DeviceConformance
+from tests.link.talk import Wire, arm
 
 _TURN_TICKS = 1 << 16
 
@@ -50,6 +51,33 @@ class AvrConformance(DeviceConformance):
     @pytest.mark.parametrize("seed", [1])
     def test_one_percent_of_damaged_bytes_changes_nothing(self, bench, seed):
         super().test_one_percent_of_damaged_bytes_changes_nothing(bench, seed)
+
+    def test_the_lamp_is_on_while_armed_and_flashes_while_a_drop_is_held(self, bench, device):
+        def seen(seconds):
+            found = set()
+            for _ in range(20):
+                bench.clock().sleep(seconds / 20)
+                found.add(bench.now().avr.output(bench.board.wiring.led))
+            return found
+
+        assert seen(0.1) == {False}
+        token = arm(device, record_ms=50)
+        assert seen(0.1) == {True}
+        device.fire(token)
+        assert seen(0.04) == {True}
+        device.collect(LABEL)
+        assert seen(1.1) == {True, False}
+
+    @pytest.mark.parametrize("byte", [0x00, 0x5A, 0xFF])
+    def test_memory_that_was_lost_while_the_power_was_low_is_not_believed(self, bench, byte):
+        Wire(bench).drop()
+        avr = bench.board.avr
+        for kept in ("drop", "seal", "restarts"):
+            avr.poke(kept, bytes([byte]) * len(avr.peek(kept)))
+        bench.brown_out()
+        assert Wire(bench).ask(wire.Status(), 1).phase is wire.Phase.IDLE
+        _, certificate = Wire(bench).drop()
+        assert certificate.restarts == 128 | bench.brown_out_cause
 
 
 class TestMega(AvrConformance):

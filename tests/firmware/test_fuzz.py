@@ -16,10 +16,10 @@ from tests.firmware.pico import build
 from tests.firmware.toolchain import make
 
 
-@pytest.fixture(scope="module")
-def survivor():
+@pytest.fixture(scope="module", params=["whole", "streams"])
+def survivor(request):
     """A process that answers each input it survives: how often did the release go on?"""
-    program = make("build/host/fuzz")
+    program = make(f"build/host/fuzz-{int(request.param == 'streams')}")
     with subprocess.Popen(program, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
 
         def run(script: bytes) -> int:
@@ -73,11 +73,16 @@ def test_no_input_breaks_the_core_or_holds_the_release(survivor, script):
     assert survivor(script) >= 0
 
 
-def test_the_script_can_fire(survivor):
-    """Or else the test above would show nothing about the release."""
-    arm = wire.Arm(1, 1, 1, 500_000, 5000, 1000)
-    wait = bytes((3 | 15 << 3, 255))  # 8.4 million ticks
-    assert survivor(frame(arm, 1) + bytes((3 | 8 << 3, 255)) + bytes((2, 2)) + wait) == 1
+@pytest.mark.parametrize("events", [0, 40, 1100])
+def test_drops_that_the_script_fires_reads_and_acknowledges_break_nothing(survivor, events):
+    """Few events, and more than there is room for."""
+    soon, wait = bytes((3 | 8 << 3, 255)), bytes((3 | 15 << 3, 255))  # 65 thousand ticks, 8 million
+    blinks = b"".join(bytes((4 | (n + 1) % 2 << 7, 200)) for n in range(events))
+    reads = b"".join(frame(wire.Read(1, *part), n) for n, part in enumerate(((0, 0), (2, 40)), 5))
+    drop = frame(wire.Arm(1, 1, 1, 500_000, 5000, 1000), 1) + soon + bytes((2, 2)) + blinks
+    # It is read behind a reset, and given up, before the next.
+    drop += 2 * wait + bytes((7, 4)) + reads + bytes((2 | 1 << 3, 7)) + 3 * wait
+    assert survivor(drop + drop) == 2, "or else the test above would show nothing of the release"
 
 
 def judge_pulses(wiring, steps: int, least: int) -> None:
