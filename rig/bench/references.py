@@ -110,7 +110,8 @@ def _leg(distance: Decimal, speed: Decimal, g: Decimal, kappa: Decimal) -> tuple
     terminal, fading = (g / kappa).sqrt(), (-2 * kappa * distance).exp()
     arrival = (speed * speed * fading + terminal * terminal * (1 - fading)).sqrt()
     rate, faster = (g * kappa).sqrt(), (terminal + arrival) / (terminal + speed)
-    if kappa * distance > _THICK:  # where the next lines would take as many digits
+    # In thick air the next line would take as many digits; at the terminal speed it is 0/0.
+    if kappa * distance > _THICK or speed == terminal:
         return arrival, (kappa * distance + faster.ln()) / rate
     return arrival, (faster * (terminal - speed) / (terminal - arrival)).ln() / (2 * rate)
 
@@ -214,7 +215,7 @@ def continuum(
 
         time = mp.sqrt(2 * h / g) + time_to(mp.mpf(0)) - time_to(z0)
         braces = h * above ** (2 * a) + (above**power - r**power) / power
-        speed = mp.sqrt(2 * g * braces / r ** (2 * a))
+        speed = mp.sqrt(2 * g * braces / r ** (2 * a)) if r else mp.inf
         return _decimals(separation=h + z0 - g * time**2 / 2, speed=speed, time=time)
 
 

@@ -2,12 +2,13 @@
 
 import math
 from dataclasses import replace
+from decimal import Decimal
 from pathlib import Path
 
 import numpy as np
 import pytest
-from mpmath import mp
 
+from rig.bench.references import exact_coefficients, exact_fall
 from rig.model import paper
 from rig.model.chain import Chain
 from rig.model.continuum import UniformChain, end
@@ -18,7 +19,6 @@ from rig.model.surface import Pile, Surface
 from rig.protocol.reader import read
 from rig.units import Quantity
 from tests.model.chains import even_chain
-from tests.model.reference import printed_alpha, reference_fall
 from tests.tables import cases
 
 CHAIN = even_chain(25)
@@ -41,17 +41,15 @@ def with_u(incline=40.0, **u):
 def slopes(name, incline):
     """∂Δz and ∂V by one input, by differences of 50-digit falls."""
 
-    def end(x, which):
-        v = CENTRE | {name: x}
-        alpha = v.get("alpha") or printed_alpha(v["beta"], v["mu"], incline, mp.mpf(CHAIN.inertia))
-        gamma = (1 + mp.mpf(CHAIN.inertia)) ** 2 / (4 * mp.mpf(CHAIN.inertia))
-        return reference_fall(CHAIN.masses, CHAIN.heights, alpha, gamma, v["drop"], v["gravity"],
-                              digits=50)[which]  # fmt: skip
+    def end(x):
+        v = {**CENTRE, "incline": incline, "inertia": CHAIN.inertia, name: x}
+        by = exact_coefficients({**v, "restitution": v["beta"], "friction": v["mu"]}) | v
+        given = ([by[coefficient]] * CHAIN.rods for coefficient in ("alpha", "gamma"))
+        found = exact_fall(CHAIN.masses, CHAIN.heights, *given, v["drop"], v["gravity"])
+        return found["separation"], found["speed"]
 
-    with mp.workdps(50):
-        step = mp.mpf(10) ** -12
-        x = mp.mpf(CENTRE.get(name, GIVEN))
-        return [float((end(x + step, i) - end(x - step, i)) / (2 * step)) for i in (0, 1)]
+    step, x = Decimal("1e-12"), Decimal(CENTRE.get(name, GIVEN))
+    return [float((b - a) / (2 * step)) for a, b in zip(end(x - step), end(x + step), strict=True)]
 
 
 @pytest.mark.parametrize("incline", [15.0, 40.0, 80.0])

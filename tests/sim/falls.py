@@ -11,8 +11,9 @@ from typing import Any
 
 from mpmath import mp
 
+from rig.bench.references import exact_coefficients
 from rig.protocol import protocol, reader
-from tests.model.reference import exact_gains, exact_hits, printed_alpha
+from tests.model.reference import exact_gains, exact_hits
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
 UNIFORM = reader.read(PROTOCOLS / "inclined-uniform.yaml")
@@ -32,7 +33,8 @@ def alpha(incline: float, beta: str = "0.5", mu: str = "0.2", pile: str = "-0.37
     """Eq. 8 on the pile, which gathers below 30°, Eqs. 12 and 13 on the slope."""
     if incline < 30:
         return (1 + mp.mpf(pile)) / 4 * (1 - INERTIA)
-    return printed_alpha(beta, mu, incline, INERTIA)
+    said = {"restitution": beta, "friction": mu, "inertia": INERTIA, "incline": incline}
+    return mp.mpf(exact_coefficients(said)["alpha"])
 
 
 class ByHand:
