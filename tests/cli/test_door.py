@@ -81,8 +81,7 @@ def test_what_is_not_there_is_said(tmp_path):
     refused(SessionError, "no session", rig.open, tmp_path / "none.session")
     with pytest.raises(AttributeError, match="it offers"):
         _ = rig.opne
-    with pytest.raises(InputError):
-        rig.read_protocol(tmp_path / "none.yaml")
+    refused(InputError, "", rig.read_protocol, tmp_path / "none.yaml")
 
 
 def threads():

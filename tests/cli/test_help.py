@@ -12,6 +12,7 @@ from rig.commands.output import VOID
 from rig.commands.replay import DIFFERENT
 from rig.errors import DeviceError, InputError, RigError
 from rig.flash.boards import TARGETS
+from tests.refusals import refused
 from tests.tables import cases
 
 
@@ -41,10 +42,8 @@ def test_a_command_is_parsed_without_the_others():
 
 @pytest.mark.parametrize("words", [["bogus", "run"], ["--foo", "run"], ["", "run"], ["--", "runs"]])
 def test_what_is_no_command_is_refused_by_all_that_there_are(words, capsys):
-    with pytest.raises(SystemExit):
-        _parser(words).parse(words)
-    with pytest.raises(SystemExit):
-        _parser().parse(words)
+    refused(SystemExit, "", _parser(words).parse, words)
+    refused(SystemExit, "", _parser().parse, words)
     said = capsys.readouterr().err
     assert said[: len(said) // 2] == said[len(said) // 2 :]
 

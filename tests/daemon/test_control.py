@@ -51,8 +51,7 @@ def test_two_clients_that_race_for_control_do_not_both_get_it(processes, client)
         lambda: two.arm(1, 1),
         lambda: two.wait(0.1),
     ):
-        with pytest.raises(ControlError):
-            forbidden()
+        refused(ControlError, "", forbidden)
     processes.start_runner()
     _, told = processes.runner.communicate(timeout=PATIENCE_S)
     assert processes.runner.returncode == 4
@@ -136,8 +135,7 @@ def test_a_stop_after_a_release_that_was_not_answered_keeps_what_fell(unheard):
     processes.await_phase(Phase.RECORDING)
     worker.stop("no answer")
     processes.await_phase(Phase.HOLDING)
-    with pytest.raises(StoppedError):
-        fired.result(PATIENCE_S)
+    refused(StoppedError, "", fired.result, PATIENCE_S)
     processes.await_phase(Phase.IDLE)
     until(lambda: states(processes)[-1] == (1, 1, "recorded"))
     assert states(processes) == [(1, 1, "armed"), (1, 1, "fired"), (1, 1, "recorded")]

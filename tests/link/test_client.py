@@ -136,8 +136,7 @@ def test_what_is_asked_and_asked_again_is_counted(clock):
     port = FakePort(clock, {wire.Ping: [wire.Pong(1)]})
     one = Device(port, clock, tries=3)
     one.ping()
-    with pytest.raises(DeviceTimeoutError):
-        one.status()
+    refused(DeviceTimeoutError, "", one.status)
     counted = one.statistics()
     assert (counted["requests"], counted["repeats"]) == (2, 2)
     assert counted["tx_bytes"] == sum(map(len, port.written))
@@ -151,8 +150,7 @@ def test_enough_leave_before_an_armed_board_switches_itself_off(clock, ask, time
     port, sent = FakePort(clock, {}), []
     port.write = lambda data: sent.append((clock.now_ns(), data))
     port.read = lambda size=1: clock.sleep(0.001) or b""
-    with pytest.raises(DeviceTimeoutError):
-        ask(Device(port, clock))
+    refused(DeviceTimeoutError, "", ask, Device(port, clock))
     assert sent[times - 1][0] < within * wire.HOST_SILENCE_MS * 1e6
     assert len({data for _, data in sent}) == 1
 
@@ -351,8 +349,7 @@ def test_a_drop_is_given_out_once_when_acknowledged():
     assert say(transcript, "tx", wire.Acknowledge(1, 0), seq=4) == []
     say(transcript, "rx", certificate(1, 0))  # a late repeat
     assert transcript.unfinished_drops() == []
-    with pytest.raises(KeyError):
-        transcript.pending(1)
+    refused(KeyError, "", transcript.pending, 1)
 
 
 def test_a_drop_fetched_again_by_another_session_is_given_out_again():

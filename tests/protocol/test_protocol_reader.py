@@ -11,6 +11,7 @@ from rig.protocol.describe import describe
 from rig.protocol.reader import parse, read
 from rig.protocol.yamltree import load
 from tests.examples import examples
+from tests.refusals import refused
 from tests.tables import cases, protocol_text
 
 READY = sorted((Path(__file__).parents[2] / "protocols").glob("*.yaml"))
@@ -18,10 +19,9 @@ GOOD = protocol_text("two-gates")
 
 
 def problems(text):
-    with pytest.raises(InputError) as caught:
-        parse(text, "f")
-    assert caught.value.exit_code == 2
-    return [str(problem) for problem in caught.value.problems]
+    error = refused(InputError, "", parse, text, "f")
+    assert error.exit_code == 2
+    return [str(problem) for problem in error.problems]
 
 
 @cases
@@ -137,8 +137,7 @@ def test_files_that_cannot_be_read(tmp_path):
         (binary, "binary:2:4: not UTF-8"),
         ("a\0b", "cannot be read"),
     ]:
-        with pytest.raises(InputError, match=said):
-            read(path)
+        refused(InputError, said, read, path)
 
 
 @given(st.binary(max_size=300))
@@ -146,8 +145,7 @@ def test_files_that_cannot_be_read(tmp_path):
 def test_any_bytes_give_an_input_error(tmp_path, data):
     path = tmp_path / "any"
     path.write_bytes(data)
-    with pytest.raises(InputError):
-        read(os.fspath(path))
+    refused(InputError, "", read, os.fspath(path))
 
 
 PIECES = [

@@ -17,6 +17,7 @@ from rig.protocol.reader import parse
 from rig.protocol.reference import page, schema
 from rig.protocol.yamltree import load
 from tests.protocol.keys import around, put, value
+from tests.refusals import refused
 from tests.tables import cases, read_table
 
 ROOT = Path(__file__).parents[2]
@@ -107,10 +108,8 @@ def test_ready_protocols_obey_the_schema(path):
 @cases
 def test_what_the_reader_refuses_the_schema_refuses(wrong):
     data = {**around("protocol"), **wrong}
-    with pytest.raises(InputError):
-        parse(text(data))
-    with pytest.raises(jsonschema.ValidationError):
-        VALIDATOR.validate(data)
+    refused(InputError, "", parse, text(data))
+    refused(jsonschema.ValidationError, "", VALIDATOR.validate, data)
 
 
 def test_the_page_and_the_schema_that_are_kept_are_those_of_the_program(capsys):

@@ -14,6 +14,7 @@ from rig.recover.examine import describe, examine
 from rig.recover.save import save
 from rig.replay import replay
 from rig.session.store import Session
+from tests.refusals import refused
 from tests.session.altering import alter, killed
 
 
@@ -257,8 +258,7 @@ def test_a_lost_protocol_must_be_given(fences, copy, truth, tmp_path):
 
 def test_an_altered_protocol_must_be_given(fences, copy, truth, tmp_path):
     alter(copy, "UPDATE protocol SET text = text || '# later'")
-    with pytest.raises(SessionError, match="has lost its protocol file"):
-        save(examine(copy), tmp_path / "new")
+    refused(SessionError, "has lost its protocol file", save, examine(copy), tmp_path / "new")
     again, missing = saved(copy, tmp_path, protocol=str(fences.with_name("fences.yaml")))
     assert again["protocol"] == truth["protocol"]
     assert any("has changed since" in line for line in missing)
@@ -272,5 +272,4 @@ def test_what_may_be_simulated_is_stamped_so(copy, tmp_path):
 
 
 def test_the_new_file_must_be_new(copy):
-    with pytest.raises(SessionError, match="already exists"):
-        save(examine(copy), copy)
+    refused(SessionError, "already exists", save, examine(copy), copy)

@@ -35,6 +35,7 @@ from rig.report.plot import drawing_file, page_svg, plot, style
 from sim.dials import Dials
 from tests.analysis.drops import PROTOCOLS, UNIFORM, case, made_up
 from tests.analysis.test_datum_board import BOARD_GRADED
+from tests.refusals import refused
 from tests.report import fake_analysis
 from tests.tables import cases
 
@@ -139,8 +140,7 @@ def test_ctrl_c_waits_until_a_figure_is_drawn_and_until_it_is_written(kind, monk
             signal.raise_signal(signal.SIGINT)
             drawings.append(plot(runs_figure(TWO, 0.005)))
 
-    with pytest.raises(KeyboardInterrupt):
-        drawn()
+    refused(KeyboardInterrupt, "", drawn)
     (drawing,) = drawings
     write = drawing.draw
 
@@ -150,8 +150,7 @@ def test_ctrl_c_waits_until_a_figure_is_drawn_and_until_it_is_written(kind, monk
         drawings.append(drawing)
 
     monkeypatch.setattr(drawing, "draw", struck)
-    with pytest.raises(KeyboardInterrupt):
-        drawing_file(drawing, kind)
+    refused(KeyboardInterrupt, "", drawing_file, drawing, kind)
     assert len(drawings) > 1
 
 

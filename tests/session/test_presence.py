@@ -122,8 +122,7 @@ def test_what_is_not_committed_yet_is_saved_too_and_once(rig):
 def test_a_file_that_is_gone_is_noticed_as_its_log_is_merged(rig):
     made, _, session = rig
     session.unlink()
-    with pytest.raises(SessionError, match="while it was in use"):
-        made.session.settle()
+    refused(SessionError, "while it was in use", made.session.settle)
 
 
 def test_where_its_folder_is_gone_too_all_is_saved_in_the_state_folder(rig, tmp_path, monkeypatch):

@@ -2,7 +2,6 @@
 
 from itertools import pairwise
 
-import pytest
 import serial
 from hypothesis import given
 from hypothesis import strategies as st
@@ -19,6 +18,7 @@ from sim.snapshots import take_snapshots
 from tests.link.bench import Bench, ScriptedLab
 from tests.link.conformance import DeviceConformance
 from tests.link.talk import record_drop
+from tests.refusals import refused
 
 
 def bench_of(lab: ScriptedLab, *, line=None, **board) -> Bench:
@@ -63,9 +63,8 @@ class TestStreamingBoard(DeviceConformance):
 def test_a_board_of_another_version_is_refused_with_advice():
     board = VirtualBoard(ScriptedLab(), protocol_version=9)
     port = SimulatedSerial("test", board=board, timeout=0.02)
-    with pytest.raises(DeviceRefusedError, match="protocol version 9") as caught:
-        Device(port, port.clock).connect()
-    assert "rig flash" in caught.value.hint
+    error = refused(DeviceRefusedError, "protocol version 9", Device(port, port.clock).connect)
+    assert "rig flash" in error.hint
 
 
 def test_a_paced_clock_takes_real_time(monkeypatch):
@@ -107,5 +106,4 @@ def test_a_url_handler_only_says_which_board():
     port.open()
     assert Device(port, port_clock(port)).connect().unique_id == port.board.identity.unique_id
     port.close()
-    with pytest.raises(serial.PortNotOpenError):
-        port.read(1)
+    refused(serial.PortNotOpenError, "", port.read, 1)

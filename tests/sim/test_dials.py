@@ -3,13 +3,12 @@
 import math
 from dataclasses import asdict, replace
 
-import pytest
-
 from rig.errors import InputError
 from rig.protocol.protocol import Contact
 from rig.units import Quantity
 from sim.dials import Dials, read_dials
 from sim.scene import set_scene
+from tests.refusals import refused
 from tests.sim.falls import PROTOCOLS, UNIFORM
 from tests.tables import cases
 
@@ -55,8 +54,7 @@ def test_stated_dials_are_the_protocol_s_own_but_for_those_that_are_set():
 @cases
 def test_bad_settings_are_refused_with_what_to_do(settings, says, hint):
     scene = {"protocol": str(PROTOCOLS / "inclined-uniform.yaml")}
-    with pytest.raises(InputError) as caught:
-        set_scene("sim", scene | settings)
-    assert says in caught.value.message
-    assert hint in (caught.value.hint or "")
-    assert caught.value.exit_code == 2
+    error = refused(InputError, "", set_scene, "sim", scene | settings)
+    assert says in error.message
+    assert hint in (error.hint or "")
+    assert error.exit_code == 2
