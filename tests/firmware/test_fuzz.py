@@ -100,9 +100,7 @@ def test_every_pulse_was_armed_and_fired(name):
     judge_pulses(BOARDS[name], steps=150, least=3)
 
 
-@pytest.mark.parametrize(
-    ("steps", "least"), [(25, 1), pytest.param(1000, 20, marks=pytest.mark.slow)]
-)
-def test_every_pulse_of_a_pico_was_too(steps, least):
+def test_every_pulse_of_a_pico_was_too():
+    """More of them: ./run bench fuzz."""
     build()
-    judge_pulses(PICO, steps, least)
+    judge_pulses(PICO, steps=25, least=1)
