@@ -101,38 +101,22 @@ def test_a_running_pico_is_asked_to_take_firmware(flash, tmp_path, monkeypatch):
     assert copy.read_bytes() == DRIVE.image_path.read_bytes()
 
 
-@pytest.mark.parametrize(
-    ("reason", "message"),
-    [
-        (wire.RefusalReason.HOLDING_A_DROP, "the device still holds the drop of run 7"),
-        (wire.RefusalReason.BUSY, "the device is busy with a drop"),
-        (wire.RefusalReason.UNKNOWN_MESSAGE, "hold its BOOTSEL button"),
-    ],
-)
+@cases
 def test_a_running_pico_that_refuses_is_left_alone(flash, tmp_path, monkeypatch, reason, message):
     picos(tmp_path, monkeypatch, "RPI-RP2")
-    running(monkeypatch, tmp_path / "mounts", wire.Refused(reason, 7))
+    running(monkeypatch, tmp_path / "mounts", wire.Refused(wire.RefusalReason[reason], 7))
     with PtyBoard(**NAMES) as there:
         plug_in(monkeypatch, there.path)
         done = flash(code=4)
     assert message in done.err
 
 
-@pytest.mark.parametrize(
-    ("names", "prepare", "messages"),
-    [
-        (["A", "B"], lambda _: None, ("2 Picos wait for firmware: ", "--drive FOLDER")),
-        (["A"], lambda d: (d / "A/chainrig.uf2").mkdir(), ("A failed: Is a directory",)),
-        (["A"], lambda _: None, ("the firmware was copied, but no port of a Pico appears",)),
-        ([], lambda _: None, ("no Pico waits for firmware", "hold its BOOTSEL button")),
-        ([], lambda d: (d / "label").touch(), ("RPI-RP2 is not mounted", "/dev/disk/by-label/RP")),
-    ],
-)
+@cases
 def test_what_keeps_a_pico_from_being_flashed_is_said(
-    names, prepare, messages, flash, tmp_path, monkeypatch
+    names, folder, messages, flash, tmp_path, monkeypatch
 ):
     waiting = picos(tmp_path, monkeypatch, *names)
-    prepare(tmp_path)
+    (tmp_path / folder).mkdir(exist_ok=True)
     monkeypatch.setattr(drives, "_RESTART_S", 0.0)
     plug_in(monkeypatch, "", lambda: False)
     done = flash(code=4)
@@ -178,24 +162,11 @@ def test_options_of_the_other_boards(call, arguments, message):
     assert message in call(*arguments, code=2).err
 
 
-def _with(at: int, value: bytes, size: int = 4):
-    return lambda data: data[:at] + value + data[at + size :]
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (_with(0, b"", 1), "no whole UF2 file"),
-        (lambda _: b"", "no whole UF2 file"),
-        (_with(512, b"", 512), "damaged, or not for an RP2040: block 0"),
-        (_with(512 + 12, bytes(4)), "RP2040: block 1"),
-        (_with(28, bytes(4)), "not for an RP2040"),
-        (_with(0, b"X", 1), "damaged, or not for an RP2040: block 0"),
-        (lambda data: data.replace(b"Raspberry Pi Pico\0", b"Raspberry Pi Pika\0"), "no firmware"),
-    ],
-)
-def test_a_file_that_must_not_be_flashed(tmp_path, change, message):
-    (file := tmp_path / "it.uf2").write_bytes(change(DRIVE.image_path.read_bytes()))
+@cases
+def test_a_file_that_must_not_be_flashed(tmp_path, at, size, instead, message):
+    data, file = DRIVE.image_path.read_bytes(), tmp_path / "it.uf2"
+    at = data.index(at.encode()) if isinstance(at, str) else at
+    file.write_bytes(data[:at] + instead.encode() + data[at + size :])
     refused(InputError, message, read_image, file, DRIVE)
 
 

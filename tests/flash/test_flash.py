@@ -13,8 +13,7 @@ from tests.tables import cases
 
 VERSION = read_image(TARGETS["mega"].image_path, TARGETS["mega"]).firmware
 NAMES = {"board": "Arduino Mega 2560", "firmware": VERSION}
-PTY = "where nobody answers"
-OTHER = "is for an Arduino Uno, not for an Arduino Mega 2560"
+UNO, MEGA = TARGETS["uno"], TARGETS["mega"]
 
 
 def options(argv):
@@ -68,25 +67,13 @@ def broken_program(folder):
     return program
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "message"),
-    [
-        (lambda _: ["--port", PTY, "--avrdude", "/none"], 2, "cannot run /none: No such file"),
-        (lambda d: ["--port", PTY, "--avrdude", broken_program(d)], 2, "cannot run"),
-        (lambda _: ["--port", "/dev/null", "--hex", TARGETS["uno"].image_path], 2, OTHER),
-        (lambda d: ["--port", d / "ttyACM0"], 4, "there is no such port"),
-        *(
-            (lambda _, url=url: ["--port", url], 2, f"{url} is no board that can be flashed")
-            for url in ("sim://", "emu://", "replay://x", "socket://lab:7")
-        ),
-    ],
-)
+@cases
 def test_nothing_is_flashed_where_something_is_wrong(
     arguments, code, message, avrdude, flash, tmp_path
 ):
     with silent_port() as path:
-        given = [path if word is PTY else word for word in arguments(tmp_path)]
-        done = flash(*given, code=code)
+        places = {"SILENT": path, "BROKEN": broken_program(tmp_path), "UNO": UNO.image_path}
+        done = flash(*(places.get(word, word) for word in arguments), code=code)
     assert message in done.err
     assert avrdude.argv is None
 
@@ -123,7 +110,6 @@ def test_the_board_says_nothing(avrdude, flash, monkeypatch):
     assert "the device did not answer Identify" in done.err
 
 
-UNO, MEGA = TARGETS["uno"], TARGETS["mega"]
 END = ":00000001FF\n"
 
 
@@ -148,9 +134,9 @@ def test_every_board_of_the_table_can_be_flashed():
 
 @pytest.fixture
 def file(tmp_path):
-    def write(text: str | bytes):
+    def write(text: str):
         path = tmp_path / "it.hex"
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        path.write_bytes(text.encode("latin-1"))
         return path
 
     return write
@@ -185,25 +171,7 @@ def test_every_damaged_digit_is_found(file):
         refused(InputError, r"it\.hex:1:1: ", read_image, damaged, UNO)
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        (record(0, b"hello") + END, "is no firmware of this rig"),
-        (image(b"chainrig 1"), "is no firmware of this rig"),
-        (image(b"chainrig 1", b"chainrig 2", b"Arduino Uno"), "is no firmware of this rig"),
-        (image(b"chainrig 1", b"Arduino Uno", b"Arduino Mega 2560"), "is no firmware of this rig"),
-        (image(b"chainrig 1", b"Arduino Mega 2560"), "is for an Arduino Mega 2560"),
-        (image(*GOOD).replace(END, ""), r"it\.hex:2:1: no whole record"),
-        ("", r"it\.hex:1:1: no whole record"),
-        (END + image(*GOOD), "is no firmware of this rig"),
-        (image(*GOOD).replace(":", "", 1), r"it\.hex:1:1: no whole record"),
-        (":02000000AB53\n" + image(*GOOD), r"it\.hex:1:1: no whole record"),  # one byte of two
-        (record(0, b"", kind=9) + END, r"it\.hex:1:1: no whole record"),
-        (record(0, b"\xff\xff", kind=4) + image(*GOOD), "would overwrite the boot loader"),
-        (record(0x7E00, b"x") + image(*GOOD), "would overwrite the boot loader"),
-        (b"\xff\xfe\x00", "no whole record of an Intel HEX file"),
-    ],
-)
+@cases
 def test_what_must_not_be_flashed(file, text, says):
     refused(InputError, says, read_image, file(text), UNO)
 
