@@ -19,14 +19,7 @@ from tests.report.undrawn import undrawn  # noqa: F401 - a fixture
 from tests.session.altering import unguarded
 from tests.tables import read_table
 
-SCENES = {
-    "fence": ("picket-fence.yaml", ""),
-    "ball": ("falling-ball.yaml", ""),
-    "glider": ("glider.yaml", ""),
-    "chain": ("single-chain.yaml", ""),
-    "chains": (None, "skew_sd=1ms"),
-    "voids": (None, "skew_sd=8ms"),
-}
+SCENES = read_table(__file__, "scenes")
 COMMANDS = [words.split() for words in read_table(lab.__file__, "commands")["kept"]]
 
 

@@ -15,21 +15,14 @@ from rig.records import ClockSample, HostBreak, Job, Pulse
 from rig.results.whole import calibration, protocol_of
 from rig.session.store import Session
 from tests.session.altering import alter, unguarded
-from tests.tables import cases
+from tests.tables import cases, read_table
 
 pytestmark = pytest.mark.usefixtures("analysed_once", "undrawn")
 RUNS = 3
 HZ = 16_000_000
 PARTS = 200
 OF_DROPS = {"drop", "edge", "bytes"}
-COMMANDS = {
-    "analyze": (),
-    "estimate": (),
-    "recover": (),
-    "replay": (),
-    "export": ("--csv", "tables"),
-    "report": ("-o", "page.html"),
-}
+COMMANDS = read_table(__file__, "commands")["damaged"]
 
 
 @pytest.fixture(scope="module")

@@ -18,12 +18,9 @@ from rig.daemon.listener import Door
 from rig.daemon.socket_path import default_socket, prepare_folder
 from rig.errors import BusyError, DeviceError, InputError, RigError, VersionError
 from tests.refusals import refused
-from tests.tables import cases
+from tests.tables import cases, read_table
 
-_SECTIONS = {
-    "daemon", "port", "link", "device", "statistics", "gates", "phase", "drop", "edges", "session",
-    "runs", "control", "clients", "error", "release_test",
-}  # fmt: skip
+_SECTIONS = {*read_table(__file__, "sections")}
 
 
 async def told(path, *lines):

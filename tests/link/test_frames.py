@@ -21,6 +21,7 @@ from rig.link.refusals import DeviceRefusedError
 from tests.examples import examples
 from tests.link.strategies import MESSAGES
 from tests.refusals import refused
+from tests.tables import cases
 
 FRAMES = st.builds(
     Frame,
@@ -131,19 +132,10 @@ def test_every_message_is_in_the_table_once():
         assert not any(getattr(f.wire, "tail", False) for f in wire.FIELDS[kind][:-1])
 
 
-@pytest.mark.parametrize(
-    "message",
-    [
-        wire.Pong(2**32),
-        wire.Pong(-1),
-        wire.Read(1, 2, 256),
-        wire.EventsFrame(1, 2, bytes(7)),
-        wire.Identity(1, "b" * 25, "f", bytes(8), 1, 1, 1, 1, 1, 0, 1, ""),
-        wire.Identity(1, "b", "f", bytes(7), 1, 1, 1, 1, 1, 0, 1, ""),
-    ],
-)
-def test_what_does_not_fit_is_refused(message):
-    refused(wire.MessageError, "", wire.pack, message)
+@cases
+def test_what_does_not_fit_is_refused(kind, values):
+    values = [value.encode() if "\0" in str(value) else value for value in values]
+    refused(wire.MessageError, "", wire.pack, getattr(wire, kind)(*values))
 
 
 def test_values_without_a_name_are_refused():

@@ -30,6 +30,7 @@ from rig.model.surface import Pile, Surface
 from rig.units import Quantity
 from tests.examples import examples
 from tests.model.chains import chains, close, even_chain
+from tests.tables import cases
 
 FRICTIONS = st.one_of(st.just(0.0), st.floats(1e-6, 1.0))
 
@@ -64,18 +65,11 @@ PILED = Surface(SURFACE.restitution, SURFACE.friction, Pile(30.0, Quantity(-0.37
 RODS = even_chain(5)
 
 
-@pytest.mark.parametrize(
-    ("surface", "incline", "basis", "alpha"),
-    [
-        (SURFACE, 0.0, "level", alpha_level(0.5)),
-        (SURFACE, 40.0, "surface", alpha_inclined(0.5, 0.2, 40.0)),
-        (PILED, 0.0, "pile", alpha_level(-0.37)),
-        (PILED, 29.9, "pile", alpha_level(-0.37)),
-        (PILED, 30.0, "surface", alpha_inclined(0.5, 0.2, 30.0)),
-    ],
-)
-def test_what_alpha_rests_on(surface, incline, basis, alpha):
-    impact = impact_on(surface, RODS, incline)
+@cases
+def test_what_alpha_rests_on(piled, incline, basis, restitution):
+    impact = impact_on(PILED if piled else SURFACE, RODS, incline)
+    slopes = basis == "surface"
+    alpha = alpha_inclined(restitution, 0.2, incline) if slopes else alpha_level(restitution)
     assert (impact.basis, impact.alpha, impact.gamma) == (basis, alpha, gamma_finite(1 / 3))
     assert impact.notes == ()
 

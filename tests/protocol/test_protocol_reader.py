@@ -77,13 +77,7 @@ def test_all_faults_come_at_once_and_an_inherited_one_comes_once():
 
 @pytest.mark.parametrize("diameter", ["", ", diameter: 20 s"])
 def test_an_object_is_never_asked_for_a_length(diameter):
-    text = """\
-protocol: 1
-chains: {ball: {rods: 1%s}}
-drop: 1 m
-gates: {free: [{channel: 0, height: 500 mm}]}
-"""
-    (problem,) = problems(text % diameter)
+    (problem,) = problems(protocol_text("ball").replace("rods: 1", f"rods: 1{diameter}"))
     assert " chains.ball.diameter: " in problem
 
 

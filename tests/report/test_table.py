@@ -14,6 +14,7 @@ from rig.report.numbers import decimals_for, fixed, plus_minus
 from rig.report.parts import summary_table, tables
 from rig.units import Quantity
 from tests.report import fake_analysis
+from tests.tables import cases
 
 
 def test_zero_has_no_sign_and_an_uncertainty_two_digits() -> None:
@@ -31,23 +32,17 @@ def test_summary_is_aligned() -> None:
         assert max(map(len, (head, rule, *lines))) <= 80
 
 
-@pytest.mark.parametrize(
-    ("quantity", "text"),
-    [
-        (SimpleNamespace(value=0.123456, expanded=0.00234), "0.1235 ± 0.0023"),
-        (SimpleNamespace(value=-1.0, expanded=0.0996), "−1.00 ± 0.10"),
-        (SimpleNamespace(value=5.0, expanded=250.0), "5 ± 250"),
-        (Measured(0.123456, 0.00119), "0.1235 ± 0.0023"),
-        (Quantity(5.0, 0.1), "5.00 ± 0.20"),
-        (Quantity(5.0), "5.000"),
-        (SimpleNamespace(value=5.0, expanded=0.0), "5.000 ± 0.000"),
-        (SimpleNamespace(value=float("nan"), expanded=1.0), ""),
-        (1, "1.000"),
-        (None, ""),
-    ],
-)
-def test_digits_follow_the_uncertainty(quantity: object, text: str) -> None:
-    assert plus_minus(quantity) == text
+NUMBERS = {
+    "expanded": lambda value, expanded: SimpleNamespace(value=value, expanded=expanded),
+    "measured": Measured,
+    "quantity": Quantity,
+    "plain": lambda number: number,
+}
+
+
+@cases
+def test_digits_follow_the_uncertainty(kind: str, numbers: list[float], text: str) -> None:
+    assert plus_minus(NUMBERS[kind](*numbers)) == text
 
 
 def test_where_nothing_is_struck_nothing_is_inclined() -> None:

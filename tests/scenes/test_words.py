@@ -24,16 +24,11 @@ from rig.session.schema import RunState
 from rig.tui.app import RigApp
 from rig.tui.context import Options
 from tests.scenes.through import lacking
+from tests.tables import read_table
 from tests.tui.lab import KEYS, draw_without_pause, text_of, unseen
 
 pytestmark = pytest.mark.usefixtures("analysed_once")
-SCENES = {
-    "object": "falling-ball",
-    "track": "glider",
-    "picket-fence": "picket-fence",
-    "one-chain": "single-chain",
-    "two-chains": "inclined-uniform",
-}
+SCENES = read_table(__file__, "words")["ready"]
 """What ``rig new`` drafts, and the ready scene of the same words."""
 NAMES = r"\b(?:chains|rods)(?=:)|(?m:^  hang\b)|--rods|\d V\b"
 """Keys, options and volts, which are the same in every scene."""

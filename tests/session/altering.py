@@ -9,13 +9,9 @@ from pathlib import Path
 
 import rig
 from rig.session.schema import TABLES
+from tests.tables import read_table
 
-LATER = {  # columns and tables that formats after the first have added
-    2: ["release_sense"],
-    3: ["reference", "host_break"],
-    4: ["pulse_ticks", "pulse_end", "restarts", "supply_mv", "lowest_mv"],
-    5: ["attachment", "hash"],
-}
+LATER = read_table(__file__, "later")
 
 
 @contextmanager
