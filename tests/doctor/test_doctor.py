@@ -54,48 +54,21 @@ def test_a_good_board_is_well_and_nothing_is_driven():
     assert (board.driven, board.outputs()) == (0, 0)
 
 
-def flicker(gate, times_s, dark_s=0.004):
+def flicker(gate, first_s, every_s, count, dark_s):
+    times_s = [first_s + every_s * n for n in range(count)]
     return [(time + dark_s * (not on), gate, on) for time in times_s for on in (True, False)]
-
-
-def stopped():
-    board = calm()
-    board.stop(True)
-    return board
-
-
-def other_firmware():
-    board = calm()
-    board.identity = replace(board.identity, board="Arduino Uno", firmware="chainrig 9")
-    return board
 
 
 LIGHT = "stop and flickering gates"
 
 
-@pytest.mark.parametrize(
-    ("make", "check", "says", "advises"),
-    [
-        (other_firmware, "firmware", "chainrig 9, but chainrig", "rig flash"),
-        (lambda: calm(ppm=5650), "round trips", "clock is off by +56", "resonator"),
-        (stopped, LIGHT, "open", "close it"),
-        (lambda: calm((0.1, 5, True)), LIGHT, "gate 5 1 times within 1 s", "clear the"),
-        (
-            lambda: calm(*flicker(5, [0.0005 + n / 100 for n in range(90)])),
-            LIGHT,
-            "gate 5 90 times, in step with 100 Hz",
-            "lamps",
-        ),
-        (
-            lambda: calm(*sorted(flicker(5, [0.1], 0.4) + flicker(6, [0.2, 0.3]))),
-            LIGHT,
-            "gate 5 1 times; gate 6 2 times within 1 s",
-            "clear the",
-        ),
-    ],
-)
-def test_what_is_wrong_is_said_with_what_to_do(make, check, says, advises):
-    finding = findings(make())[check]
+@cases
+def test_what_is_wrong_is_said_with_what_to_do(board, flickers, check, says, advises):
+    blinks = sorted(blink for each in flickers for blink in flicker(*each))
+    there = calm(*map(tuple, board.get("changes", ())), *blinks, ppm=board.get("ppm", 0.0))
+    there.identity = replace(there.identity, **board.get("names", {}))
+    there.stop(board.get("stopped", False))
+    finding = findings(there)[check]
     assert says in finding.what
     assert advises in finding.advice
     assert finding.verdict is Verdict.FAILED
