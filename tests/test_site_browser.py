@@ -4,7 +4,6 @@ Of `./run bench soaks`, for a browser is large; `test_site.py` holds what can be
 """
 
 import json
-import lzma
 import os
 import re
 from html import unescape
@@ -15,7 +14,7 @@ import pytest
 from rig.cli import main
 from tests.report.test_browser import BROWSER, browse
 from tests.test_site import load
-from tests.tui.test_looks import RECORDED
+from tests.tui.lab import kept_session
 
 AXE = Path(__file__).parent / "axe/node_modules/axe-core/axe.min.js"
 REPORT = "report.html"
@@ -33,9 +32,8 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(MISSING, reason="chromium or 
 def built(tmp_path_factory):
     folder = tmp_path_factory.mktemp("site")
     load("site").main(folder)
-    session, report = folder / "a.session", folder / REPORT
-    session.write_bytes(lzma.decompress(RECORDED.read_bytes()))
-    assert main(["report", str(session), "-o", str(report)]) == 0
+    report = folder / REPORT
+    assert main(["report", str(kept_session(folder)), "-o", str(report)]) == 0
     # It lets no other script run, and folds what a referee wants.
     text = re.sub(r"<meta http-equiv=.Content-Security-Policy[^>]*>", "", report.read_text("utf-8"))
     report.write_text(text.replace("<details ", "<details open "), "utf-8")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.cli import main
+from rig.link.frames import Decoder, Frame
 from rig.replay import replay
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -87,6 +88,13 @@ def drops_of(session: Path) -> list[tuple[int, int]]:
     """Return run and attempt of every recorded drop, in order of recording."""
     with Session.open(session, readonly=True) as opened:
         return [(drop.run, drop.attempt) for drop in opened.drops()]
+
+
+def frames_of(session: Path) -> list[tuple[str, Frame]]:
+    """Return what went over the line, in order, each frame with its direction."""
+    decoders = {"tx": Decoder(), "rx": Decoder()}
+    with Session.open(session, readonly=True) as opened:
+        return [(way, f) for _, way, data in opened.byte_log() for f in decoders[way].feed(data)]
 
 
 def assert_whole(session: Path, planned: int) -> None:

@@ -1,7 +1,6 @@
 """The page on which a class looks on: read-only, of any size and patience, beside the daemon."""
 
 import json
-import lzma
 import re
 import socket
 import subprocess
@@ -20,7 +19,7 @@ from rig.tui.indicators import Indicators
 from rig.tui.motion import motions
 from rig.tui.scale import drawing
 from tests.cli.lab import command
-from tests.tui.test_looks import RECORDED
+from tests.tui.lab import kept_session
 from tests.waiting import PATIENCE_S, until
 
 CLIENTS = 400
@@ -122,15 +121,8 @@ def test_a_place_that_cannot_be_had_is_refused(daemon, call, place):
     assert "--board" in refused.err
 
 
-@pytest.fixture
-def recorded(tmp_path):
-    session = tmp_path / "a.session"
-    session.write_bytes(lzma.decompress(RECORDED.read_bytes()))
-    return session
-
-
-def test_a_session_is_shown_in_words_and_pictures_until_another_is_open(recorded):
-    page = BoardPage("http://192.0.2.7:8080/")
+def test_a_session_is_shown_in_words_and_pictures_until_another_is_open(tmp_path):
+    recorded, page = kept_session(tmp_path), BoardPage("http://192.0.2.7:8080/")
     assert "No session is open" in page.look({})
     news = {"session": str(recorded), "drop": None}
     assert "is being read" in page.look(news)

@@ -5,7 +5,6 @@ Of `./run bench soaks`, for a browser is large; `test_board.py` holds what can b
 
 import asyncio
 import json
-import lzma
 import re
 from contextlib import closing
 
@@ -17,7 +16,7 @@ from rig.cli import main
 from rig.recorder.published import PublishedState
 from tests.report.test_browser import browse
 from tests.test_site_browser import AXE, MISSING, RUN_AXE, ask_browser
-from tests.tui.test_looks import RECORDED
+from tests.tui.lab import kept_session
 from tests.waiting import PATIENCE_S
 
 PAGES = ["board.html", "local.html", "report.html"]
@@ -29,9 +28,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(MISSING, reason="chromium or 
 
 @pytest.fixture(scope="module")
 def session(tmp_path_factory):
-    path = tmp_path_factory.mktemp("recorded") / "a.session"
-    path.write_bytes(lzma.decompress(RECORDED.read_bytes()))
-    return path
+    return kept_session(tmp_path_factory.mktemp("recorded"))
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ from itertools import pairwise
 import pytest
 
 from rig.link import messages as wire
-from rig.link.frames import Decoder
 from rig.results.whole import calibration
 from rig.session.store import Session
+from tests.cli.lab import frames_of
 from tests.cli.test_replay import tamper
 
 PING, REFERENCE, STATUS = (wire.CODES[kind] for kind in (wire.Ping, wire.Reference, wire.Status))
@@ -91,17 +91,14 @@ def test_gravity_that_is_not_the_places_is_said(measure, call, fence):
 
 def test_nothing_asks_for_the_time_from_arming_to_the_certificate(finished):
     """Only what keeps the device armed, and what fires: by the bytes themselves."""
-    decoders = {"tx": Decoder(), "rx": Decoder()}
     armed, during, idle = False, [], []
-    with Session.open(finished.session, readonly=True) as session:
-        for _, direction, data in session.byte_log():
-            for frame in decoders[direction].feed(data):
-                if frame.type == ARM:
-                    armed = True
-                if direction == "tx":
-                    (during if armed else idle).append(frame.type)
-                if frame.type in {CERTIFICATE, DISARMED}:
-                    armed = False
+    for direction, frame in frames_of(finished.session):
+        if frame.type == ARM:
+            armed = True
+        if direction == "tx":
+            (during if armed else idle).append(frame.type)
+        if frame.type in {CERTIFICATE, DISARMED}:
+            armed = False
     assert during.count(FIRE) == 4
     assert set(during) <= {ARM, FIRE, STATUS}
     assert {PING, REFERENCE} <= set(idle)

@@ -54,11 +54,8 @@ def working(processes: ProcessFixture) -> Iterator[tuple[Worker, Callable[..., A
         return worker.submit(work, "me").result(PATIENCE_S)
 
     try:
-        ask(
-            lambda controller: controller.open_session(
-                str(processes.protocol), str(processes.session)
-            )
-        )
+        files = str(processes.protocol), str(processes.session)
+        ask(lambda controller: controller.open_session(*files))
         yield worker, ask
     finally:
         worker.end()

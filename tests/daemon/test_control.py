@@ -12,10 +12,10 @@ from bench.process_fixture import ProcessFixture
 from rig.daemon.lease import LEASE_S
 from rig.errors import ControlError, InputError, StoppedError
 from rig.link.client import Device
-from rig.link.frames import Decoder
 from rig.link.messages import TABLE, Abort, DropCertificate2, Fire, Phase
 from rig.session.schema import RunState
 from rig.session.store import Session
+from tests.cli.lab import frames_of
 from tests.daemon.at_work import ended, states, working
 from tests.refusals import refused
 from tests.waiting import PATIENCE_S, until
@@ -29,11 +29,8 @@ def armed(driver):
 
 def talked(processes, *kinds):
     """Tell which messages of these kinds went over the line, in order."""
-    codes = {code: kind for code, kind in TABLE.items() if kind in kinds}
-    decoders = {"tx": Decoder(), "rx": Decoder()}
-    with Session.open(processes.session, readonly=True) as session:
-        frames = [f for _, way, data in session.byte_log() for f in decoders[way].feed(data)]
-    return [codes[frame.type] for frame in frames if frame.type in codes]
+    told = [TABLE[frame.type] for _, frame in frames_of(processes.session)]
+    return [kind for kind in told if kind in kinds]
 
 
 def gone_on_with(processes):

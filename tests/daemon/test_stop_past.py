@@ -8,17 +8,13 @@ from types import SimpleNamespace
 from rig.daemon.lease import Lease
 from rig.daemon.worker import Worker
 from rig.errors import DeviceTimeoutError
-from rig.link.frames import Decoder, Frame, encode
+from rig.link.frames import Frame, encode
 from rig.link.messages import CODES, Abort, Disarmed, DisarmReason, Done, Phase, pack
 from rig.recorder.controller import Controller
 from rig.recorder.published import PublishedState
 from rig.session.schema import RunState
-from rig.session.store import Session
+from tests.cli.lab import drops_of, frames_of
 from tests.waiting import PATIENCE_S, until
-
-
-def frames(session, direction):
-    return Decoder().feed(b"".join(data for _, way, data in session.byte_log() if way == direction))
 
 
 def test_stop_goes_past_a_disk_that_does_not_answer(processes, driver, client):
@@ -41,11 +37,15 @@ def test_stop_goes_past_a_disk_that_does_not_answer(processes, driver, client):
         other.execute("ROLLBACK")
     until(lambda: two.call("subscribe")["state"]["error"] is None)
     driver.stop("and again, with a disk that does")
-    with Session.open(processes.session, readonly=True) as session:
-        # Where nothing is armed any more, what was said is on the disk some seconds later.
-        until(lambda: any(f.seq == 255 and f.type == CODES[Abort] for f in frames(session, "tx")))
-        until(lambda: any(f.ack == 255 and f.type == CODES[Done] for f in frames(session, "rx")))
-        assert session.drop(1, 1) is None
+
+    def said(*what):  # a direction, a message, and which request it is or answers
+        frames = frames_of(processes.session)
+        return what in {(way, f.type, f.seq if way == "tx" else f.ack) for way, f in frames}
+
+    # Where nothing is armed any more, what was said is on the disk some seconds later.
+    until(lambda: said("tx", CODES[Abort], 255))
+    until(lambda: said("rx", CODES[Done], 255))
+    assert drops_of(processes.session) == []
 
 
 def test_a_stop_between_the_look_and_the_answer_is_kept(monkeypatch):

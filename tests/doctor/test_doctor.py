@@ -25,7 +25,7 @@ from rig.selftest.findings import Verdict, make_check
 from rig.selftest.run import run_checks
 from rig.session.store import Session
 from tests.flash.pty_board import PtyBoard, silent_port
-from tests.selftest.benches import LoopedBoard, Wire, fire_drop, hold_drop, port_of
+from tests.selftest.benches import LoopedBoard, fire_drop, hold_drop, port_of, wired
 from tests.selftest.broken import claims, odd
 from tests.session.altering import alter
 from tests.tables import cases
@@ -42,7 +42,7 @@ def findings(board=None, port=None):
 
 def calm(*changes, **settings):
     """Build a board at which nothing moves, but what the lab is told."""
-    (lab := Wire()).changes = list(changes)
+    (lab := wired()).changes = list(changes)
     return LoopedBoard(lab, **settings)
 
 
@@ -92,7 +92,7 @@ def test_a_gate_that_forbids_firing_now_and_then_is_tried_again(reason, times, m
 
 def test_an_input_without_a_gate_is_a_note(monkeypatch):
     monkeypatch.setattr("sim.board.Microcontroller", claims("gates", lambda gates: gates | 1 << 6))
-    board = LoopedBoard(Wire(None, blocked=1 << 6))
+    board = LoopedBoard(wired(None, blocked=1 << 6))
     found = findings(board)
     assert found["gates"].verdict is Verdict.NOT_POSSIBLE
     assert found["gates"].what.endswith("gate 6 blocked all the time")
@@ -273,7 +273,7 @@ def test_programs_read_codes(doctor, tmp_path):
 def test_a_restart_in_a_drop_is_timed_and_found_again_in_the_session(doctor, tmp_path):
     path = tmp_path / "s.session"
     with Session.create(path, "x", "x.yaml", simulated=True, origin="x") as session:
-        port = port_of(LoopedBoard(Wire(None)))
+        port = port_of(LoopedBoard(wired(None)))
         device, label = fire_drop(port, 3, session.log_bytes)
         port.clock.sleep(0.004)
         port.board.brown_out(port.clock.now_ns())

@@ -3,7 +3,6 @@
 Of `./run bench soaks`, for a browser is large; `test_page.py` holds what can be told without one.
 """
 
-import lzma
 import os
 import shutil
 from pathlib import Path
@@ -12,7 +11,7 @@ import pytest
 
 from rig.cli import main
 from tests.programs import run_program
-from tests.tui.test_looks import RECORDED
+from tests.tui.lab import kept_session
 
 BROWSER = shutil.which("chromium")
 MISSING = BROWSER is None and not os.environ.get("CI")
@@ -29,9 +28,7 @@ pytestmark = [
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
     folder = tmp_path_factory.mktemp("page")
-    session = folder / "a.session"
-    session.write_bytes(lzma.decompress(RECORDED.read_bytes()))
-    assert main(["report", str(session), "-o", str(folder / "report.html")]) == 0
+    assert main(["report", str(kept_session(folder)), "-o", str(folder / "report.html")]) == 0
     return folder / "report.html"
 
 
@@ -59,7 +56,7 @@ def test_print_has_no_empty_page(page, tmp_path):
 
 
 def test_a_pdf_needs_no_browser(page, tmp_path):
-    paper, session = tmp_path / "report.pdf", page.with_name("a.session")
+    paper, session = tmp_path / "report.pdf", page.with_name("looks.session")
     assert main(["report", str(session), "-o", str(tmp_path / "a.html"), "--pdf", str(paper)]) == 0
     pages = read_pages(paper)
     assert 2 < len(pages) <= 5

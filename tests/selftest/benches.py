@@ -7,23 +7,15 @@ from rig.selftest.findings import Verdict
 from rig.selftest.run import selftest
 from sim.board import VirtualBoard
 from sim.serial_port import SimulatedSerial
+from tests.link.bench import ScriptedLab
 from tests.link.talk import arm
 
 GATE = 3
 
 
-class Wire:
-    """The lab of a board at which only a wire changes anything, and some gates are blocked."""
-
-    def __init__(self, gate: int | None = GATE, late_s: float = 0.0, blocked: int = 0) -> None:
-        self.changes = [] if gate is None else [(late_s, gate, True)]
-        self.blocked = blocked
-
-    def rest(self, label: int) -> int:
-        return self.blocked
-
-    def drop(self, label: int) -> list[tuple[float, int, bool]]:
-        return self.changes
+def wired(gate: int | None = GATE, late_s: float = 0.0, blocked: int = 0) -> ScriptedLab:
+    """Make the lab of a board at which only a wire changes anything, and some gates are blocked."""
+    return ScriptedLab(blocked, [] if gate is None else [(late_s, gate, True)])
 
 
 class LoopedBoard(VirtualBoard):

@@ -9,7 +9,7 @@ from rig.link.messages import DisarmReason, Phase, RefusalReason
 from rig.selftest.board import LABEL, OTHER_LABEL
 from sim.controller import Microcontroller
 from sim.recording import Recording
-from tests.selftest.benches import GATE, LoopedBoard, Wire
+from tests.selftest.benches import GATE, LoopedBoard, wired
 
 COUNT = count(1)
 
@@ -104,7 +104,7 @@ def identified(**fields):
 
 
 def bouncing():
-    board = LoopedBoard(Wire())
+    board = LoopedBoard(wired())
     board.lab.changes = [(0.0, GATE, True), (0.001, GATE, False), (0.002, GATE, True)]
     return board
 
@@ -195,7 +195,7 @@ BROKEN = [
     ("bad requests", ODD, odd(answer=agrees)),
     ("bad requests", ODD, odd(answer=any_length)),
     ("round trips", "slow_answers", odd(LoopedBoard, receive=late_answers)),
-    ("round trips", "clock_off", lambda: LoopedBoard(Wire(), ppm=20_000)),
+    ("round trips", "clock_off", lambda: LoopedBoard(wired(), ppm=20_000)),
     ("gates", "gates_blocked", claims("gates", lambda gates: gates | STUCK)),
     ("gates", "gates_flicker", claims("gates", lambda gates: gates | STUCK * (next(COUNT) % 2))),
     ("GATE_BLOCKED", ODD, claims("gates", lambda gates: gates | STUCK)),
@@ -249,7 +249,7 @@ BROKEN = [
     ("COOLING", ODD, odd(_arm=never_cools)),
     ("COOLING", ODD, answers("_arm", wire.Refused, detail=lambda _: 10_000)),
     ("COOLING", ODD, answers("_arm", wire.Refused, detail=lambda rest_ms: rest_ms // 2)),
-    ("sync output to gate", "sync_late", lambda: LoopedBoard(Wire(late_s=20e-6))),
+    ("sync output to gate", "sync_late", lambda: LoopedBoard(wired(late_s=20e-6))),
     ("sync output to gate", "sync_edges", bouncing),
     ("sync output to gate", "sync_blocked", claims("gates", lambda gates: gates | 1 << GATE)),
 ]

@@ -18,7 +18,7 @@ from rig.selftest.run import CHECKS, run_checks, selftest
 from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
 from tests.link.talk import arm
-from tests.selftest.benches import GATE, LoopedBoard, Wire, hold_drop, outcomes, port_of
+from tests.selftest.benches import GATE, LoopedBoard, hold_drop, outcomes, port_of, wired
 from tests.selftest.broken import BROKEN, claims, odd
 from tests.tables import cases
 
@@ -38,7 +38,7 @@ def failed(found):
 @pytest.mark.parametrize("streams", [False, True])
 @pytest.mark.parametrize("ppm", [-3000.0, 0.0, 3000.0])
 def test_a_good_board_passes(ppm, streams):
-    board = LoopedBoard(Wire(), seed=2, ppm=ppm, streams=streams)
+    board = LoopedBoard(wired(), seed=2, ppm=ppm, streams=streams)
     found = outcomes(port_of(board))
     assert failed(found) == []
     assert {n for n, o in found.items() if o.verdict is Verdict.NOT_POSSIBLE} == HANDS
@@ -79,8 +79,8 @@ BOARDS = {"looped": LoopedBoard, "held up": HeldUp, "stopped": Stopped, "12 gate
 def test_a_right_rig_fails_nothing_and_is_told_what_it_lacks(
     board, wiring, options, says, monkeypatch
 ):
-    lab = Wire(**wiring)
-    controller = claims("gates", lambda gates: gates | lab.blocked)
+    lab = wired(**wiring)
+    controller = claims("gates", lambda gates: gates | lab.hanging)
     monkeypatch.setattr("sim.board.Microcontroller", controller)
     board = BOARDS[board](lab)
     found = outcomes(port_of(board), **options)
@@ -91,7 +91,7 @@ def test_a_right_rig_fails_nothing_and_is_told_what_it_lacks(
 
 def test_a_busy_computer_blames_no_board(monkeypatch):
     monkeypatch.setattr("rig.selftest.line_checks._ASK_S", 0.3)
-    found = outcomes(port_of(LoopedBoard(Wire())))
+    found = outcomes(port_of(LoopedBoard(wired())))
     assert failed(found) == []
     assert found["arming times out"].what == TIME.replace("125", "250")
 
@@ -101,7 +101,7 @@ def test_a_gate_in_use_that_is_blocked_or_not_there_fails(
     number, blocked, in_use, code, what, monkeypatch
 ):
     monkeypatch.setattr("sim.board.Microcontroller", claims("gates", lambda gates: gates | blocked))
-    board = fewer_gates(Wire(blocked=blocked), number)
+    board = fewer_gates(wired(blocked=blocked), number)
     gates = outcomes(port_of(board), gates=in_use)["gates"]
     assert (gates.verdict, gates.reason.code, gates.what) == (Verdict.FAILED, code, what)
 
@@ -136,7 +136,7 @@ def test_behind_a_terminal_in_real_time(rig):
 
 def test_a_drop_of_a_session_is_left_alone(monkeypatch):
     monkeypatch.setattr("sim.board.Microcontroller", claims("gates", lambda gates: gates | 1))
-    port = port_of(LoopedBoard(Wire()))
+    port = port_of(LoopedBoard(wired()))
     _, label, drop = hold_drop(port, 7)
     results = outcomes(port)
     assert failed(results) == []
@@ -152,7 +152,7 @@ def test_a_drop_of_a_session_is_left_alone(monkeypatch):
 
 
 def test_a_drop_that_an_earlier_test_left_is_cleared_away():
-    port = port_of(LoopedBoard(Wire()))
+    port = port_of(LoopedBoard(wired()))
     device, *_ = hold_drop(port, wire.TEST_RUN)
     assert failed(outcomes(port)) == []
     assert device.status().phase is wire.Phase.IDLE
@@ -164,9 +164,9 @@ ONLY_HANDS = {"GATE_UNSTEADY", "STOPPED", "NOT_KEPT"}
 
 def board_of(kind, monkeypatch):
     if not (isinstance(kind, type) and issubclass(kind, Microcontroller)):
-        return kind(Wire()) if isinstance(kind, type) else kind()
+        return kind(wired()) if isinstance(kind, type) else kind()
     monkeypatch.setattr("sim.board.Microcontroller", kind)
-    return LoopedBoard(Wire())
+    return LoopedBoard(wired())
 
 
 def found_by(check, board):
@@ -240,7 +240,7 @@ def test_a_board_that_falls_silent_fails_what_is_left():
     def listen(self, usual):
         return self._inbox.popleft() if self._last and self._last[0] == 0x55 else usual()
 
-    found = outcomes(port_of(odd(LoopedBoard, _listen=listen)(Wire())))
+    found = outcomes(port_of(odd(LoopedBoard, _listen=listen)(wired())))
     assert {name for name in found if found[name].verdict is Verdict.OK} == {"handshake"}
     assert found["ARMED"].what == "the device did not answer Status()"
 
@@ -251,14 +251,14 @@ def test_what_is_no_message_is_a_failure():
         if self._last is not None and self._last[0] == wire.CODES[wire.Reference]:
             self.line.send(self._now_ns, encode(Frame(0xF0, 1, 0, b"")))
 
-    found = outcomes(port_of(odd(LoopedBoard, _listen=listen)(Wire())))
+    found = outcomes(port_of(odd(LoopedBoard, _listen=listen)(wired())))
     assert found["IDLE"].reason.code == "invalid_message"
     assert found["IDLE"].reason.values == {"text": "unknown message code 0xF0"}
     assert found["junk on the line"].verdict is Verdict.OK
 
 
 def test_a_cable_that_is_pulled_is_said(monkeypatch):
-    port = port_of(LoopedBoard(Wire()))
+    port = port_of(LoopedBoard(wired()))
     tests = selftest(port, SelftestOptions())
     next(tests)
 

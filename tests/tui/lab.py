@@ -1,6 +1,7 @@
 """A daemon with a simulated rig, an operator's hands on the screen, and the screen as text."""
 
 import io
+import lzma
 import os
 import re
 import signal
@@ -28,6 +29,15 @@ from tests.cli.lab import ROOT
 from tests.waiting import PATIENCE_S
 
 KEYS = {action.name: action.keys for action in ACTIONS}
+_LOOKS = Path(__file__).with_name("looks.session.xz")
+
+
+def kept_session(folder: Path) -> Path:
+    """Write what ``rig run`` recorded of `tests.cli.lab.short` at ``sim://?seed=4``."""
+    path = folder / "looks.session"
+    path.write_bytes(lzma.decompress(_LOOKS.read_bytes()))
+    return path
+
 
 DAEMON = """\
 import rig.daemon.lease, rig.daemon.worker

@@ -1,11 +1,9 @@
 """What stands on the screens, at three sizes, against text files; and the pictures of them.
 
 ``GOLDENS=write ./run test tests/tui/test_looks.py`` writes the files anew; look at the difference.
-``looks.session.xz`` is what ``rig run`` recorded of `tests.cli.lab.short` at ``sim://?seed=4``.
 """
 
 import asyncio
-import lzma
 import os
 import re
 from dataclasses import replace
@@ -24,7 +22,7 @@ from rig.tui.app import THEMES, RigApp
 from rig.tui.context import Options
 from rig.tui.state import state_of
 from tests.cli.lab import short
-from tests.tui.lab import KEYS, colours_of, draw_without_pause, text_of
+from tests.tui.lab import KEYS, colours_of, draw_without_pause, kept_session, text_of
 
 THEME_NAMES = [theme.name for theme in THEMES]
 GOLDENS = Path(__file__).parent / "goldens"
@@ -120,7 +118,6 @@ async def _screens(moment, sizes, path, look, themes=THEME_NAMES[:1]):
     return found
 
 
-RECORDED = Path(__file__).with_name("looks.session.xz")
 PAGES = ["protocol", "device", "run", "live", "result", "session", "history"]
 
 
@@ -129,10 +126,9 @@ def recorded(tmp_path, monkeypatch):
     """A session and its protocol in the working folder, so that no screen shows another's name."""
     monkeypatch.chdir(tmp_path)
     draw_without_pause(monkeypatch)
-    protocol, session = Path("looks.yaml"), Path("looks.session")
+    protocol = Path("looks.yaml")
     protocol.write_text(short(), "utf-8")
-    session.write_bytes(lzma.decompress(RECORDED.read_bytes()))
-    return session, (protocol,)
+    return kept_session(Path()), (protocol,)
 
 
 def test_all_pages_look_as_they_did(recorded):
