@@ -16,6 +16,7 @@ from rig.replay import replay
 from rig.session.store import Session
 from tests.refusals import refused
 from tests.session.altering import alter, killed
+from tests.tables import cases
 
 
 @pytest.fixture
@@ -242,30 +243,19 @@ def test_a_file_that_may_only_be_read(copy, monkeypatch):
 # -- what must be given, and what is guessed
 
 
-UNSAID = "DELETE FROM meta WHERE key = 'simulated'"
-
-
-def test_a_lost_protocol_must_be_given(fences, copy, truth, tmp_path):
-    alter(copy, UNSAID, "DELETE FROM protocol")
-    with pytest.raises(SessionError, match="has lost its protocol file") as caught:
-        save(examine(copy), tmp_path / "new")
-    assert "--protocol" in caught.value.hint
+@cases
+def test_a_protocol_that_is_lost_or_altered_must_be_given(sql, said, fences, copy, truth, tmp_path):
+    alter(copy, *sql)
+    lost = "has lost its protocol file"
+    assert "--protocol" in refused(SessionError, lost, save, examine(copy), tmp_path / "new").hint
     again, missing = saved(copy, tmp_path, protocol=str(fences.with_name("fences.yaml")))
     assert again["protocol"] == truth["protocol"]
     assert again["simulated"]  # as its board says
-    assert "the protocol file" in missing
-
-
-def test_an_altered_protocol_must_be_given(fences, copy, truth, tmp_path):
-    alter(copy, "UPDATE protocol SET text = text || '# later'")
-    refused(SessionError, "has lost its protocol file", save, examine(copy), tmp_path / "new")
-    again, missing = saved(copy, tmp_path, protocol=str(fences.with_name("fences.yaml")))
-    assert again["protocol"] == truth["protocol"]
-    assert any("has changed since" in line for line in missing)
+    assert any(said in line for line in missing)
 
 
 def test_what_may_be_simulated_is_stamped_so(copy, tmp_path):
-    alter(copy, UNSAID, "DELETE FROM identity")
+    alter(copy, "DELETE FROM meta WHERE key = 'simulated'", "DELETE FROM identity")
     again, missing = saved(copy, tmp_path)
     assert again["simulated"]
     assert any("stamped as simulated" in line for line in missing)

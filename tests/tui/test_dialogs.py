@@ -5,8 +5,8 @@ from dataclasses import replace
 from textual.widgets import Input
 
 from rig.campaign.machine import Stage
-from rig.session.store import Session
 from rig.tui.widgets.dialogs import Ask, Confirm, TextDialog
+from tests.cli.lab import drops_of, log_of
 from tests.tui.lab import DAEMON, listening
 
 
@@ -97,9 +97,10 @@ async def test_stop_works_in_every_state_that_lasts(lab):
         await op.arms(Stage.LIVE)
         await stops(op, "escape")
         await op.at(Stage.RESULT)  # what there is is kept and judged
-    with Session.open(lab.session, readonly=True) as session:
-        (drop,) = session.drops()
-        assert drop.run == 1
+    ((run, attempt),) = drops_of(lab.session)
+    assert run == 1
+    assert attempt > 1
+    assert log_of(lab.session)[1][:2] == [(1, "armed"), (1, "interrupted")]
 
 
 async def test_the_release_is_tried_only_after_a_yes_and_is_no_run(lab):

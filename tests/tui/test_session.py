@@ -7,32 +7,7 @@ from rig.session.schema import RunState
 from rig.session.store import Session
 from rig.tui.commands import REASONS
 from rig.tui.widgets.dialogs import Ask
-from tests.cli.lab import log_of
 from tests.tui.lab import flat, text_of
-
-
-async def test_any_key_before_the_release_stops_and_nothing_falls(lab):
-    stopped_at = []
-
-    async with lab.ready(countdown_s=600.0) as op:
-        for key in ("f9", "escape", "k"):
-            stopped = False
-            while not stopped:  # a board that a busy machine leaves alone disarms itself
-                await op.arms(Stage.COUNTDOWN)
-                stopped_at.append(attempt := op.app.flow.job.attempt)
-                await op.until(lambda: op.app.flow.stage is not Stage.COUNTDOWN
-                               or "Any key stops" in flat(op.app))  # fmt: skip
-                await op.press(key)
-                await op.at(Stage.PREPARE)
-                await op.sees(f"Run 1 of 3 · attempt {attempt + 1}")
-                stopped = "stopped: nothing fell" in flat(op.app)
-            await op.until(lambda: op.app.follower.state.line(1).state == "interrupted")
-    log = [entry for entries in log_of(lab.session).values() for entry in entries]
-    assert log == [
-        (attempt, state)
-        for attempt in range(1, stopped_at[-1] + 1)
-        for state in (RunState.ARMED, RunState.INTERRUPTED)
-    ]
 
 
 async def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
