@@ -7,6 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Container, Iterator
+from contextlib import AbstractAsyncContextManager, AsyncExitStack
 from pathlib import Path
 
 import pytest
@@ -59,11 +60,20 @@ def pytest_collection() -> Iterator[object]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> bool | None:
-    """Give a test that is a coroutine a loop of its own."""
+    """Give a test that is a coroutine a loop of its own, and fixtures that are entered in it."""
     if not inspect.iscoroutinefunction(pyfuncitem.obj):
         return None
+
+    async def work() -> None:
+        given = {name: pyfuncitem.funcargs[name] for name in names}
+        async with AsyncExitStack() as stack:
+            for name, value in given.items():
+                if isinstance(value, AbstractAsyncContextManager):
+                    given[name] = await stack.enter_async_context(value)
+            await pyfuncitem.obj(**given)
+
     names = inspect.signature(pyfuncitem.obj).parameters
-    asyncio.run(pyfuncitem.obj(**{name: pyfuncitem.funcargs[name] for name in names}))
+    asyncio.run(work())
     return True
 
 

@@ -3,6 +3,7 @@
 import asyncio
 from collections.abc import Callable, Iterator
 from contextlib import asynccontextmanager
+from types import SimpleNamespace
 
 import pytest
 
@@ -44,23 +45,19 @@ def driver(processes, client):
 
 
 @pytest.fixture
-def door(tmp_path):
+@asynccontextmanager
+async def door(tmp_path):
     """Have a daemon in the test's own loop, whose simulated port is still closed."""
-
-    @asynccontextmanager
-    async def opened():
-        path = tmp_path / "door" / "rig.sock"
-        server, ready = Server("sim://", path), asyncio.Event()
-        server.serving = asyncio.create_task(server.run(ready.set))
-        try:
-            async with asyncio.timeout(PATIENCE_S):
-                await ready.wait()
-                yield server, path
-            failed = server.serving.done()
-        finally:
-            server.end()
-            await asyncio.gather(server.serving, return_exceptions=True)
-        assert failed or server.serving.exception() is None
-        assert not any(path.parent.iterdir()), "nothing stays of it"
-
-    return opened
+    path = tmp_path / "door" / "rig.sock"
+    server, ready = Server("sim://", path), asyncio.Event()
+    server.serving = asyncio.create_task(server.run(ready.set))
+    try:
+        async with asyncio.timeout(PATIENCE_S):
+            await ready.wait()
+            yield SimpleNamespace(server=server, path=path)
+        failed = server.serving.done()
+    finally:
+        server.end()
+        await asyncio.gather(server.serving, return_exceptions=True)
+    assert failed or server.serving.exception() is None
+    assert not any(path.parent.iterdir()), "nothing stays of it"

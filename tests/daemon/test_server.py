@@ -48,9 +48,8 @@ async def greeted(path, behind=b""):
 
 
 async def test_only_the_user_may_come_near(door):
-    async with door() as (_server, path):
-        assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
-        assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert stat.S_IMODE(door.path.parent.stat().st_mode) == 0o700
+    assert stat.S_IMODE(door.path.stat().st_mode) == 0o600
 
 
 def test_a_folder_that_is_open_to_others_is_refused(tmp_path):
@@ -73,89 +72,80 @@ def test_somebody_elses_folder_is_refused(tmp_path, monkeypatch):
 
 
 async def test_another_user_is_not_served(door, monkeypatch):
-    async with door() as (_server, path):
-        uid = os.getuid()
-        monkeypatch.setattr("rig.daemon.server.peer_uid", lambda _: uid + 1)
-        assert await told(path, HELLO) == [None]
+    uid = os.getuid()
+    monkeypatch.setattr("rig.daemon.server.peer_uid", lambda _: uid + 1)
+    assert await told(door.path, HELLO) == [None]
 
 
 async def test_a_client_of_another_version_is_told_so_and_sent_away(door):
-    async with door() as (_server, path):
-        skewed = rpc.request("hello", {"api": rpc.API + 1, "client": "t"}, 1)
-        answer, end = await told(path, skewed, HELLO)
-        error = rpc.error_of(answer)
-        assert isinstance(error, VersionError)
-        assert "version 2 of the daemon's interface" in str(error)
-        assert end is None
+    skewed = rpc.request("hello", {"api": rpc.API + 1, "client": "t"}, 1)
+    answer, end = await told(door.path, skewed, HELLO)
+    error = rpc.error_of(answer)
+    assert isinstance(error, VersionError)
+    assert "version 2 of the daemon's interface" in str(error)
+    assert end is None
 
 
 @cases
 async def test_nonsense_gets_its_code_and_the_next_request_its_answer(door, method, params, code):
     line = f"{params}\n".encode() if method is None else rpc.request(method, params, 2)
 
-    async with door() as (_server, path):
-        _, nonsense, answer = await told(path, HELLO, line, rpc.request("unsubscribe", {}, 3))
-        assert nonsense["error"]["code"] == code
-        assert answer["result"] == {}
+    _, nonsense, answer = await told(door.path, HELLO, line, rpc.request("unsubscribe", {}, 3))
+    assert nonsense["error"]["code"] == code
+    assert answer["result"] == {}
 
 
 async def test_hello_comes_first(door):
-    async with door() as (_server, path):
-        answer, end = await told(path, rpc.request("subscribe", {}, 1), HELLO)
-        assert answer["error"]["code"] == rpc.INVALID
-        assert end is None
+    answer, end = await told(door.path, rpc.request("subscribe", {}, 1), HELLO)
+    assert answer["error"]["code"] == rpc.INVALID
+    assert end is None
 
 
 async def test_an_endless_line_ends_the_connection_and_not_the_daemon(door):
-    async with door() as (_server, path):
-        reader, writer = await greeted(path, b"x" * (2 * rpc.REQUEST_LIMIT))
-        assert await reader.read() == b""
-        writer.close()
-        assert (await told(path, HELLO))[0]["result"]["api"] == rpc.API
+    reader, writer = await greeted(door.path, b"x" * (2 * rpc.REQUEST_LIMIT))
+    assert await reader.read() == b""
+    writer.close()
+    assert (await told(door.path, HELLO))[0]["result"]["api"] == rpc.API
 
 
 async def test_a_snapshot_has_every_section_that_is_promised(door):
-    async with door() as (_server, path):
-        client = await AsyncClient.connect(path, "tui")
-        await client.call("subscribe")
-        assert set(client.replica.state) == _SECTIONS
-        assert client.replica.state["port"] == {
-            "url": "sim://", "simulated": True, "path": "sim://",
-        }  # fmt: skip
-        assert client.replica.state["clients"] == 1
-        await client.close()
+    client = await AsyncClient.connect(door.path, "tui")
+    await client.call("subscribe")
+    assert set(client.replica.state) == _SECTIONS
+    assert client.replica.state["port"] == {
+        "url": "sim://", "simulated": True, "path": "sim://",
+    }  # fmt: skip
+    assert client.replica.state["clients"] == 1
+    await client.close()
 
 
 async def test_a_client_that_does_not_read_costs_little_and_gets_a_snapshot_when_it_does(door):
-    async with door() as (server, path):
-        slow = socket.socket(socket.AF_UNIX)
-        slow.connect(str(path))
-        slow.sendall(HELLO + rpc.request("subscribe", {}, 2))
-        slow.setblocking(False)
-        while not any(one.subscribed for one in server.service.connections):
-            await asyncio.sleep(0)
-        (stuck,) = server.service.connections
-        quick = await AsyncClient.connect(path, "quick")
-        await quick.call("subscribe")
-        for number in range(400):
-            server.published.set(error={"message": f"{number} " + "x" * 2000})
-            server.service.publisher.spread()
-            assert stuck.waiting() < 100_000
-            while not str((quick.replica.state["error"] or {}).get("message")).startswith(
-                f"{number} "
-            ):
-                await asyncio.sleep(0)  # the other one is not slowed down
-        assert stuck.behind
-        data = b""
-        loop = asyncio.get_running_loop()
-        while b'"method":"snapshot"' not in data or not data.endswith(b"\n"):
-            data += await loop.sock_recv(slow, 1 << 20)
-        methods = [json.loads(line).get("method") for line in data.splitlines()]
-        last = json.loads(data.splitlines()[methods.index("snapshot")])["params"]
-        assert last["state"]["error"]["message"].startswith("399 ")
-        assert methods.count("change") < 400
-        slow.close()
-        await quick.close()
+    slow = socket.socket(socket.AF_UNIX)
+    slow.connect(str(door.path))
+    slow.sendall(HELLO + rpc.request("subscribe", {}, 2))
+    slow.setblocking(False)
+    while not any(one.subscribed for one in door.server.service.connections):
+        await asyncio.sleep(0)
+    (stuck,) = door.server.service.connections
+    quick = await AsyncClient.connect(door.path, "quick")
+    await quick.call("subscribe")
+    for number in range(400):
+        door.server.published.set(error={"message": f"{number} " + "x" * 2000})
+        door.server.service.publisher.spread()
+        assert stuck.waiting() < 100_000
+        while not str((quick.replica.state["error"] or {}).get("message")).startswith(f"{number} "):
+            await asyncio.sleep(0)  # the other one is not slowed down
+    assert stuck.behind
+    data = b""
+    loop = asyncio.get_running_loop()
+    while b'"method":"snapshot"' not in data or not data.endswith(b"\n"):
+        data += await loop.sock_recv(slow, 1 << 20)
+    methods = [json.loads(line).get("method") for line in data.splitlines()]
+    last = json.loads(data.splitlines()[methods.index("snapshot")])["params"]
+    assert last["state"]["error"]["message"].startswith("399 ")
+    assert methods.count("change") < 400
+    slow.close()
+    await quick.close()
 
 
 def test_a_second_daemon_is_refused_and_a_dead_ones_socket_is_not_in_the_way():
@@ -247,138 +237,130 @@ def test_a_door_at_which_nobody_ever_looks_is_not_waited_at_for_ever(tmp_path, m
 async def test_beyond_the_last_client_stop_is_done_and_nothing_else(door, monkeypatch):
     monkeypatch.setattr(service, "CLIENTS", 2)
 
-    async with door() as (server, path):
-        clients = [await AsyncClient.connect(path, f"client {n}") for n in range(3)]
-        with pytest.raises(BusyError, match="any further client may only stop"):
-            await clients[2].call("subscribe")
-        assert await clients[2].call("stop") == {}
-        await clients[0].close()
-        while server.published.get("clients") > 1:
-            await asyncio.sleep(0)
-        await (await AsyncClient.connect(path, "in its place")).close()
-        for client in clients:
-            await client.close()
+    clients = [await AsyncClient.connect(door.path, f"client {n}") for n in range(3)]
+    with pytest.raises(BusyError, match="any further client may only stop"):
+        await clients[2].call("subscribe")
+    assert await clients[2].call("stop") == {}
+    await clients[0].close()
+    while door.server.published.get("clients") > 1:
+        await asyncio.sleep(0)
+    await (await AsyncClient.connect(door.path, "in its place")).close()
+    for client in clients:
+        await client.close()
 
 
 async def test_who_says_nothing_is_told_so_and_sent_away(door, monkeypatch):
     monkeypatch.setattr("rig.daemon.server.HELLO_S", 0.05)
 
-    async with door() as (_server, path):
-        reader, writer = await asyncio.open_unix_connection(path)
-        told = json.loads(await reader.readline())
-        assert (told["id"], told["error"]["data"]["kind"]) == (None, "BusyError")
-        assert await reader.read() == b""
-        writer.close()
-        client = await AsyncClient.connect(path, "who says hello stays")
-        await asyncio.sleep(0.1)
-        assert await client.call("renew") == {"disk_s": 0.0}
-        await client.close()
+    reader, writer = await asyncio.open_unix_connection(door.path)
+    told = json.loads(await reader.readline())
+    assert (told["id"], told["error"]["data"]["kind"]) == (None, "BusyError")
+    assert await reader.read() == b""
+    writer.close()
+    client = await AsyncClient.connect(door.path, "who says hello stays")
+    await asyncio.sleep(0.1)
+    assert await client.call("renew") == {"disk_s": 0.0}
+    await client.close()
 
 
 NAMES = ["\ud800x", "\x1b[2J", "\u202etxt.exe", "a\nb", "\0", "ü" * 500]
 
 
 async def test_whatever_a_client_is_called_all_see_it(door):
-    async with door() as (_server, path):
-        watcher = await AsyncClient.connect(path, "watcher")
-        await watcher.call("subscribe")
-        for name in NAMES:
-            client = await AsyncClient.connect(path, name)
-            await client.call("take_control")
-            while watcher.replica.state["control"] is None:
-                await asyncio.sleep(0)
-            shown = watcher.replica.state["control"]["client"]
-            assert shown.isprintable()
-            assert 0 < len(shown) <= 80
-            assert await client.call("stop", reason=name) == {}
-            await client.close()
-            while watcher.replica.state["control"] is not None:
-                await asyncio.sleep(0)
-        await watcher.close()
+    watcher = await AsyncClient.connect(door.path, "watcher")
+    await watcher.call("subscribe")
+    for name in NAMES:
+        client = await AsyncClient.connect(door.path, name)
+        await client.call("take_control")
+        while watcher.replica.state["control"] is None:
+            await asyncio.sleep(0)
+        shown = watcher.replica.state["control"]["client"]
+        assert shown.isprintable()
+        assert 0 < len(shown) <= 80
+        assert await client.call("stop", reason=name) == {}
+        await client.close()
+        while watcher.replica.state["control"] is not None:
+            await asyncio.sleep(0)
+    await watcher.close()
 
 
 async def test_a_part_that_dies_ends_the_daemon_and_says_so(door, monkeypatch, caplog):
-    async with door() as (server, _path):
 
-        def broken():
-            raise ArithmeticError("of a kind that nobody foresaw")
+    def broken():
+        raise ArithmeticError("of a kind that nobody foresaw")
 
-        monkeypatch.setattr(server.service.publisher, "spread", broken)
-        server.published.set(error={"message": "anything"})
-        with pytest.raises(ArithmeticError, match="nobody foresaw"):
-            await server.serving
-        assert "a part of the daemon failed" in caplog.text
+    monkeypatch.setattr(door.server.service.publisher, "spread", broken)
+    door.server.published.set(error={"message": "anything"})
+    with pytest.raises(ArithmeticError, match="nobody foresaw"):
+        await door.server.serving
+    assert "a part of the daemon failed" in caplog.text
 
 
 async def test_a_worker_that_dies_ends_the_daemon(door, monkeypatch, caplog):
-    async with door() as (server, _path):
 
-        def broken():
-            raise SystemError
+    def broken():
+        raise SystemError
 
-        monkeypatch.setattr(server._worker, "_attend", broken)
-        server._worker.wake()
-        with pytest.raises(SystemError):
-            await server.serving
+    monkeypatch.setattr(door.server._worker, "_attend", broken)
+    door.server._worker.wake()
+    with pytest.raises(SystemError):
+        await door.server.serving
 
 
 async def test_a_stop_is_read_behind_any_number_of_requests(door, monkeypatch):
-    async with door() as (server, path):
-        reader, writer = await greeted(path)
-        control = rpc.request("take_control", {}, 2)
-        waits = [rpc.request("wait", {"seconds": 3600}, number) for number in range(3, 300)]
-        (client,) = server.service.connections
-        do = client._do
+    reader, writer = await greeted(door.path)
+    control = rpc.request("take_control", {}, 2)
+    waits = [rpc.request("wait", {"seconds": 3600}, number) for number in range(3, 300)]
+    (client,) = door.server.service.connections
+    do = client._do
 
-        async def held(one, request):
-            if request.method == "wait":
-                await asyncio.Event().wait()
-            return await do(one, request)
+    async def held(one, request):
+        if request.method == "wait":
+            await asyncio.Event().wait()
+        return await do(one, request)
 
-        monkeypatch.setattr(client, "_do", held)
-        writer.write(control + b"".join(waits) + rpc.request("stop", {}, 1000))
-        told = {}
-        while not {299, 1000} <= told.keys():  # the stop may overtake
-            answer = json.loads(await reader.readline())
-            told[answer["id"]] = answer
-        assert told[1000]["result"] == {}
-        assert told[299]["error"]["data"]["kind"] == "BusyError"
-        writer.close()
+    monkeypatch.setattr(client, "_do", held)
+    writer.write(control + b"".join(waits) + rpc.request("stop", {}, 1000))
+    told = {}
+    while not {299, 1000} <= told.keys():  # the stop may overtake
+        answer = json.loads(await reader.readline())
+        told[answer["id"]] = answer
+    assert told[1000]["result"] == {}
+    assert told[299]["error"]["data"]["kind"] == "BusyError"
+    writer.close()
 
 
 async def test_a_stop_waits_for_no_more_than_what_is_being_answered(door, monkeypatch):
-    async with door() as (server, path):
-        lines = [await asyncio.open_unix_connection(path) for _ in range(21)]
-        for _, writer in lines:
-            writer.write(HELLO)
-        while server.published.get("clients") < len(lines):
-            await asyncio.sleep(0)
-        (_, stopping), *many = lines
-        done, do = [], server.service.do
+    lines = [await asyncio.open_unix_connection(door.path) for _ in range(21)]
+    for _, writer in lines:
+        writer.write(HELLO)
+    while door.server.published.get("clients") < len(lines):
+        await asyncio.sleep(0)
+    (_, stopping), *many = lines
+    done, do = [], door.server.service.do
 
-        def noted(client, request):
-            if not done:
-                stopping.write(rpc.request("stop", {}, 9))
-            done.append(request.method)
-            return do(client, request)
+    def noted(client, request):
+        if not done:
+            stopping.write(rpc.request("stop", {}, 9))
+        done.append(request.method)
+        return do(client, request)
 
-        for one in server.service.connections:
-            monkeypatch.setattr(one, "_do", noted)
-        for _, writer in many:
-            writer.write(b"".join(rpc.request("subscribe", {}, number) for number in range(20)))
-        while "stop" not in done:
-            await asyncio.sleep(0)
-        assert done.count("subscribe") < len(many)
-        for _, writer in lines:
-            writer.close()
+    for one in door.server.service.connections:
+        monkeypatch.setattr(one, "_do", noted)
+    for _, writer in many:
+        writer.write(b"".join(rpc.request("subscribe", {}, number) for number in range(20)))
+    while "stop" not in done:
+        await asyncio.sleep(0)
+    assert done.count("subscribe") < len(many)
+    for _, writer in lines:
+        writer.close()
 
 
 async def test_of_a_client_that_goes_nothing_stays(door):
-    async with door() as (server, path):
-        _, writer = await greeted(path)
-        writer.close()
-        while server._serving:
-            await asyncio.sleep(0)
-        await asyncio.sleep(0)  # what is cancelled ends in the next turn
-        running = [task.get_coro().__qualname__ for task in asyncio.all_tasks()]
-        assert not [name for name in running if name.startswith("Connection.")]
+    _, writer = await greeted(door.path)
+    writer.close()
+    while door.server._serving:
+        await asyncio.sleep(0)
+    await asyncio.sleep(0)  # what is cancelled ends in the next turn
+    running = [task.get_coro().__qualname__ for task in asyncio.all_tasks()]
+    assert not [name for name in running if name.startswith("Connection.")]

@@ -5,7 +5,6 @@ import pytest
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
 from rig.errors import InputError
 from rig.link.client import Device
-from rig.link.messages import Phase
 from rig.link.port import open_port
 from rig_emulator import boards_bench
 from rig_emulator.pico_board import USB_RATE, EmulatedPico
@@ -13,13 +12,12 @@ from rig_emulator.protocol_emu import EmulatedSerial
 from rig_emulator.wiring import PICO
 from tests.firmware.pico import build, symbol
 from tests.firmware.toolchain import FIRMWARE
-from tests.link.bench import LABEL, Bench, ScriptedLab, falling_rods
+from tests.link.bench import Bench, ScriptedLab
 from tests.link.conformance import DeviceConformance
-from tests.link.talk import arm, record_drop, release_drop
+from tests.link.talk import record_drop
 from tests.tables import cases
 
 HZ = 20_000_000
-CYCLES = 6 * HZ
 
 
 class PicoBench(Bench):
@@ -37,39 +35,6 @@ class PicoBench(Bench):
         upper = 2**16 - round(seconds_before_wrap * HZ) // 2**16
         chip.ahead(upper - int.from_bytes(chip.peek(looked, 2), "little") << 16)
         chip.poke(looked, upper.to_bytes(2, "little"))
-
-
-def test_an_afternoon_with_one():
-    """All that matters once, in a few seconds: the whole suite is below."""
-    bench = PicoBench(ScriptedLab(changes=falling_rods()))
-    chip = bench.board.avr
-    device = Device(bench.port(), bench.clock())
-    identity = device.connect()
-    assert chip.texts == ["chainrig", "chainrig on a Pico", identity.unique_id.hex().upper()]
-    assert (identity.tick_hz, identity.gates) == (HZ, 16)
-
-    suite = TestPico()
-    drop = record_drop(device)
-    suite.check(bench, drop, identity)
-    assert drop.certificate.supply_mv == pytest.approx(5000, abs=5)
-    release_drop(device, drop)
-
-    # The release rests; then the emergency stop ends a pulse, and the board says by how much.
-    bench.clock().sleep(1)
-    device.fire(arm(device, LABEL + 1, pulse_us=400_000, record_ms=100))
-    bench.clock().sleep(0.02)
-    bench.stop(True)
-    drop = device.collect(LABEL + 1)
-    assert "pulse_stopped" in {fault.code for fault in drop.faults}
-    on, off = (c.cycle for c in list(bench.board.history)[-3:-1])
-    assert drop.certificate.pulse_ticks == (off - on) // 6
-    assert off - on == pytest.approx(0.0203 * 1.002 * CYCLES, rel=0.1)
-    release_drop(device, drop)
-    bench.stop(False)
-
-    suite.restart(bench, device)
-    assert device.status().phase is Phase.IDLE
-    bench.serial.close()
 
 
 @cases

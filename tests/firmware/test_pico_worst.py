@@ -56,6 +56,21 @@ def test_a_program_that_hangs_ends_its_pulse_as_ordered_or_with_the_watchdog(sta
     assert stand.avr.watchdog_resets == bitten + 2
 
 
+def test_the_emergency_stop_ends_a_pulse_and_by_how_much_is_certified(stand):
+    stand.arm_and_fire(60, 400_000)
+    stand.hear(20 * MS)
+    stand.avr.edge(opened := stand.avr.cycle, PICO.stop, True)
+    certificate = stand.hear(80 * MS)[-1]
+    off, also = ends(stand)
+    assert off == also == pytest.approx(opened - stand.fired + 300 * US, abs=20)
+    assert certificate.pulse_end == wire.PulseEnd.STOPPED
+    assert certificate.pulse_ticks == off // 6
+    assert certificate.supply_mv == pytest.approx(5000, abs=5)
+    stand.ask(wire.Acknowledge(certificate.label, certificate.crc32))
+    stand.avr.edge(0, PICO.stop, False)
+    stand.hear(60 * MS)  # it rests three times as long as it was on
+
+
 def test_the_emergency_stop_works_without_the_program(stand):
     stand.arm_and_fire(500, 100_000)
     stand.hear(1 * MS)
