@@ -11,6 +11,7 @@ from rig.records import ClockSample
 from rig.replay import replay
 from rig.session.store import Session
 from sim.board import VirtualBoard
+from tests.cli.lab import drops_of
 from tests.session.altering import unguarded
 from tests.tables import cases
 
@@ -96,6 +97,5 @@ def test_a_drop_whose_acknowledgement_was_lost_is_replayed_once(call, tmp_path, 
     call(*command, code=4)
     assert len(lost) == 8
     call(*command)
-    with Session.open(tmp_path / "s", readonly=True) as session:
-        assert [(drop.run, drop.attempt) for drop in session.drops()] == [(1, 1), (2, 1)]
+    assert drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
     assert call("replay", tmp_path / "s").out.splitlines()[0] == "drops: 2 identical"

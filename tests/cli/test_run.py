@@ -136,9 +136,9 @@ def test_a_line_that_loses_most_bytes_is_device_trouble_and_can_be_continued(
     run(protocol=fence)
 
 
-def connected(session):
+def ports_of(session):
     with Session.open(session, readonly=True) as opened:
-        return len(opened.identities())
+        return [identity["port"] for _, identity in opened.identities()]
 
 
 def test_a_bad_line_may_be_exchanged_for_a_better_one(run, tmp_path, fence):
@@ -146,16 +146,17 @@ def test_a_bad_line_may_be_exchanged_for_a_better_one(run, tmp_path, fence):
         session = tmp_path / f"s{seed}"
         worn = {"port": "sim://?lose=3%25", "protocol": fence}
         done = run(session.name, "--seed", seed, **worn, code={0, 4})
-        if done.code == 4 and connected(session):
+        if done.code == 4 and ports_of(session):
             break
     else:
         pytest.fail("no seed gets through to the board and fails then")
     run(session.name, port="sim://?lose=0", protocol=fence)
     assert_whole(session, 2)
     run(session.name, protocol=fence)
-    with Session.open(session, readonly=True) as opened:
-        ports = [identity["port"] for _, identity in opened.identities()]
-    assert ports == [f"sim://?lose=3%25&seed={seed}", *[f"sim://?lose=0&seed={seed}"] * 2]
+    assert ports_of(session) == [
+        f"sim://?lose=3%25&seed={seed}",
+        *[f"sim://?lose=0&seed={seed}"] * 2,
+    ]
 
 
 def test_other_chains_are_not_mixed_into_a_simulated_session(run, tmp_path, fence):

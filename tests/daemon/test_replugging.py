@@ -4,7 +4,6 @@ import os
 from contextlib import closing
 
 import pytest
-from serial.tools.list_ports_common import ListPortInfo
 
 from bench.invariants import broken
 from bench.process_fixture import ProcessFixture
@@ -16,6 +15,7 @@ from rig.recorder.published import PublishedState
 from rig.session.store import Session
 from tests.daemon.at_work import let_fall, working
 from tests.daemon.far_port import FarPort
+from tests.flash.pty_board import info
 from tests.waiting import until
 
 
@@ -26,12 +26,8 @@ def usb(monkeypatch):
     links = {}
 
     def comports():
-        found = []
-        for link, serial_number in links.items():
-            if link.exists():
-                found.append(ListPortInfo(os.path.realpath(link)))
-                found[-1].serial_number = serial_number
-        return found
+        there = {link: number for link, number in links.items() if link.exists()}
+        return [info(os.path.realpath(link), serial_number=there[link]) for link in there]
 
     monkeypatch.setattr("serial.tools.list_ports.comports", comports)
     return links

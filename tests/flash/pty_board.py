@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 
+from serial.tools.list_ports_common import ListPortInfo
+
 from sim.board import VirtualBoard
 from sim.terminal import Terminal
 from tests.link.bench import ScriptedLab
@@ -23,6 +25,14 @@ def silent_port() -> Iterator[str]:
     yield os.ttyname(ends[1])
     for end in ends:
         os.close(end)
+
+
+def info(path, vid=None, pid=None, serial_number=None, product=None) -> ListPortInfo:
+    """Describe a port as pyserial finds it."""
+    found = ListPortInfo(path)
+    found.vid, found.pid = vid, pid
+    found.serial_number, found.product = serial_number, product
+    return found
 
 
 class PtyBoard:

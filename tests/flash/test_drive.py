@@ -8,7 +8,6 @@ from threading import Timer
 from unittest.mock import Mock
 
 import pytest
-from serial.tools.list_ports_common import ListPortInfo
 
 from rig.errors import InputError
 from rig.flash import drive as drives
@@ -18,7 +17,7 @@ from rig.flash.image import read_image, shipped_firmware
 from rig.link import messages as wire
 from rig.reasons import rig_error
 from sim.controller import Microcontroller
-from tests.flash.pty_board import PtyBoard
+from tests.flash.pty_board import PtyBoard, info
 from tests.refusals import refused
 from tests.tables import cases
 
@@ -45,9 +44,8 @@ def picos(folder: Path, monkeypatch, *names: str) -> list[Path]:
 
 def plug_in(monkeypatch, path: str, is_in: Callable[[], bool] = lambda: True) -> None:
     """Have a Pico's port be there, while it is."""
-    info = ListPortInfo(path)
-    info.vid, info.pid, info.product = 0x2E8A, 0x000A, "chainrig on a Pico"
-    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [info] if is_in() else [])
+    port = info(path, 0x2E8A, 0x000A, product="chainrig on a Pico")
+    monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [port] if is_in() else [])
     monkeypatch.setattr(drives, "_LOOK_S", 0.001)
 
 

@@ -18,10 +18,9 @@ from rig.recorder.published import PublishedState
 from rig.recover.examine import examine
 from rig.session.schema import RunState
 from rig.session.store import Session
+from tests.cli.lab import drops_of
 from tests.programs import run_program
 from tests.refusals import refused
-
-DROPS = ((1, 1), (2, 1))
 
 
 def open_files():
@@ -104,8 +103,7 @@ def test_a_drop_that_fell_meanwhile_is_saved_before_it_is_acknowledged(rig, lose
     made.fire(made.arm(2, 1))
     lose(session)
     refused(SessionError, "while it was in use", made.collect, 2, 1)
-    with Session.open(session.with_name("session.saved-1"), readonly=True) as found:
-        assert [(one.run, one.attempt) for one in found.drops()] == [*DROPS]
+    assert drops_of(session.with_name("session.saved-1")) == [(1, 1), (2, 1)]
 
 
 def test_what_is_not_committed_yet_is_saved_too_and_once(rig):
@@ -193,8 +191,7 @@ def test_a_disk_that_can_only_be_read_any_more_leaves_the_drop_on_the_board(disk
     refused(SessionError, "the disk failed under", made.collect, 2, 1)
     refused(DeviceError, "the device still holds the drop of run 2", made.arm, 3, 1)
     refused(SessionError, "the disk failed under", made.close)
-    with Session.open(session, readonly=True) as found:
-        assert [one.run for one in found.drops()] == [1]
+    assert drops_of(session) == [(1, 1)]
 
 
 def test_a_disk_that_knows_no_locks_is_said_to(tmp_path, monkeypatch):

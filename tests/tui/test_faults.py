@@ -9,8 +9,8 @@ from contextlib import closing
 import pytest
 
 from rig.campaign.machine import Stage
-from rig.session.store import Session
 from rig.tui import app, client
+from tests.cli.lab import drops_of
 from tests.tui.lab import PATIENCE_S, text_of
 
 
@@ -136,5 +136,4 @@ def test_a_drop_that_falls_without_its_line_is_found_when_it_is_back(cabled, fau
         return job
 
     job = asyncio.run(work())
-    with Session.open(lab.session, readonly=True) as session:
-        assert [(drop.run, drop.attempt) for drop in session.drops()] == [job]
+    assert drops_of(lab.session) == [job]

@@ -9,25 +9,17 @@ from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
-from serial.tools.list_ports_common import ListPortInfo
 
 from rig.boards import PICO
 from rig.cli import _parser
 from rig.errors import DeviceError
 from rig.flash.drive import pico_ports
 from rig.usb.listing import KNOWN, Known, SerialPort, path_of, serial_number_at, serial_ports
-from tests.flash.pty_board import PtyBoard
+from tests.flash.pty_board import PtyBoard, info
 from tests.programs import run_program
 from tests.tables import cases
 
 PACKAGING = Path(__file__).parents[2] / "packaging"
-
-
-def info(path, vid=None, pid=None, serial_number=None, product=None):
-    found = ListPortInfo(path)
-    found.vid, found.pid = vid, pid
-    found.serial_number, found.product = serial_number, product
-    return found
 
 
 @pytest.fixture
