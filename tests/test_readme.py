@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from rig.cli import _parser
+from tests.programs import run_program
 from tests.tables import read_table
 
 ROOT = Path(__file__).parents[1]
@@ -71,10 +72,7 @@ def carry_out(folder, installed, first, *more):
     for words in (["/bin/bash", "-c", first], ["python", "-c", ONE_PROCESS, *more])[
         : 1 + any(more)
     ]:
-        done = subprocess.run(words, capture_output=True, text=True, check=False,
-                              stdin=subprocess.DEVNULL, **where)  # fmt: skip
-        assert done.returncode == 0, f"{first}\n{done.stdout}\n{done.stderr}"
-        said += done.stdout
+        said += run_program(*words, timeout=None, stdin=subprocess.DEVNULL, **where).stdout
     return said
 
 
@@ -150,8 +148,7 @@ def test_the_teachers_page_has_few_new_words():
 
 
 def test_the_demo_finds_the_truth():
-    done = subprocess.run(["./run", "demo"], cwd=ROOT, capture_output=True, text=True, check=True)
-    said = " ".join(done.stdout.split())
+    said = " ".join(run_program("./run", "demo", timeout=None, cwd=ROOT).stdout.split())
     held, of = re.search(r"([0-9]+) of ([0-9]+) results agree", said).groups()
     assert int(of) == 18
     assert int(held) >= 14, "at 95 % that is fewer once in a thousand seeds"

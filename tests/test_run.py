@@ -2,10 +2,10 @@
 
 import os
 import re
-import subprocess
 from pathlib import Path
 
 from bench.__main__ import BENCHES
+from tests.programs import run_program
 
 ROOT = Path(__file__).parents[1]
 
@@ -19,9 +19,7 @@ def test_tests_get_what_any_shell_has_and_what_installers_need():
     kept = {"PATH": os.environ["PATH"], "LANG": "C.UTF-8", "PIP_CERT": "a b", "https_proxy": "c"}
     lost = {"PYTHONUNBUFFERED": "1", "PYTEST_ADDOPTS": "-x", "RIG_PORT": "sim://"}
     script = f"set -euo pipefail\n{function('bare')}\nbare env"
-    done = subprocess.run(
-        ["bash", "-c", script], env=kept | lost, capture_output=True, text=True, check=True
-    )
+    done = run_program("bash", "-c", script, env=kept | lost)
     assert dict(line.split("=", 1) for line in done.stdout.splitlines()) == kept
 
 
@@ -32,5 +30,4 @@ def test_every_bench_is_sent_to_where_it_is(tmp_path):
     wanted |= {name: f"bench {name}" for name in ("precision", "scenes", "stability")}
     calls = "".join(f"\none_bench {name}" for name in wanted)
     script = f"say() {{ :; }}\nbin={tmp_path}\n{function('one_bench')}{calls}"
-    told = subprocess.run(["bash", "-c", script], capture_output=True, text=True, check=True).stdout
-    assert told.splitlines() == [*wanted.values()]
+    assert run_program("bash", "-c", script).stdout.splitlines() == [*wanted.values()]

@@ -72,8 +72,7 @@ def test_results_are_the_same_as_anywhere(bare):
     assert not (bare.folder / "my.session.lock").exists()
     here = json.loads(done.stdout[done.stdout.index("{") :])
     rig = [sys.executable, "-m", "rig", "analyze", "my.session", "--json", "--fresh"]
-    done = subprocess.run(rig, cwd=bare.folder, capture_output=True, check=True)
-    assert here == json.loads(done.stdout)
+    assert here == json.loads(run_program(*rig, cwd=bare.folder).stdout)
 
 
 def test_commands_work(bare):

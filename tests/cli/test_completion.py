@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -10,7 +9,6 @@ import pytest
 
 from rig.command_page import COMMANDS
 from tests.programs import run_program
-from tests.waiting import PATIENCE_S
 
 
 def completed(tmp_path: Path, line: str) -> set[str]:
@@ -20,9 +18,7 @@ def completed(tmp_path: Path, line: str) -> set[str]:
         "_ARGCOMPLETE": "1", "_ARGCOMPLETE_IFS": "\n", "COMP_LINE": line,
         "COMP_POINT": str(len(line)), "_ARGCOMPLETE_STDOUT_FILENAME": str(answer),
     }  # fmt: skip
-    subprocess.run(
-        [sys.executable, "-m", "rig"], env=os.environ | asked, check=True, timeout=PATIENCE_S
-    )
+    run_program(sys.executable, "-m", "rig", env=os.environ | asked)
     return {word.strip() for word in answer.read_text("utf-8").splitlines()}
 
 

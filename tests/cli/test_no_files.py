@@ -6,7 +6,6 @@ import re
 import shutil
 import signal
 import socket
-import subprocess
 import sys
 
 import pytest
@@ -121,8 +120,7 @@ def test_a_shell_may_pass_on_text(said, fence, call):
 
 def test_output_goes_into_any_pipe():
     code = f"from {write_atomic.__module__} import write_atomic; write_atomic('/dev/stdout', 'x')"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
-    assert done.stdout == b"x"
+    assert run_program(sys.executable, "-c", code).stdout == "x"
 
 
 def test_nothing_takes_the_place_of_a_session(finished):

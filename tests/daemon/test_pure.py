@@ -1,5 +1,6 @@
 """Framing, errors as data, control, the state and its replica: what needs no port and no clock."""
 
+import copy
 import json
 import random
 import socket
@@ -156,38 +157,37 @@ def test_a_door_that_was_lost_is_never_this_daemons_again(tmp_path, monkeypatch)
     assert place.exists()
 
 
+def planned(runs):
+    return [{"run": n, "state": "planned"} for n in range(runs)]
+
+
 def test_a_replica_shows_what_is_published_whenever_it_is_looked_at():
     """Random changes, taken at random moments, by one who joins at a random moment."""
     for seed in range(20):
         chance, published, replica = random.Random(seed), PublishedState(), None
-        published.plan({"run": n, "state": "planned"} for n in range(5))
+        below = chance.randrange
+        published.plan(planned(5))
         for _ in range(200):
-            match chance.randrange(6):
+            match below(6):
                 case 0:
-                    published.set(
-                        gates={"blocked": chance.randrange(3)}, clients=chance.randrange(3)
-                    )
+                    published.set(gates={"blocked": below(3)}, clients=below(3))
                 case 1:
-                    published.run(chance.randrange(7), state=chance.choice(["armed", "fired"]))
+                    published.run(below(7), state=chance.choice(["armed", "fired"]))
                 case 2:
-                    published.edges(
-                        (chance.randrange(99), 1, 0) for _ in range(chance.randrange(3))
-                    )
+                    published.edges([(below(99), 1, 0) for _ in range(below(3))])
                 case 3 if chance.random() < 0.3:
-                    published.replace_edges([(chance.randrange(9), 0, 1)])
+                    published.replace_edges([(below(9), 0, 1)])
                 case 4 if chance.random() < 0.1:
-                    published.plan(
-                        {"run": n, "state": "planned"} for n in range(chance.randrange(5))
-                    )
+                    published.plan(planned(below(5)))
                 case _:
                     change = published.take()
+                    whole = json.loads(json.dumps(published.snapshot()))
                     if replica is None:
                         replica = Replica()
-                        replica.follow("snapshot", json.loads(json.dumps(published.snapshot())))
+                        replica.follow("snapshot", copy.deepcopy(whole))
                     elif change is not None:
                         replica.follow("change", json.loads(json.dumps(change)))
-                    assert replica.n == published.snapshot()["n"]
-                    assert json.loads(json.dumps(published.snapshot()["state"])) == replica.state
+                    assert (replica.n, replica.state) == (whole["n"], whole["state"])
 
 
 def test_a_change_that_changes_nothing_is_none():

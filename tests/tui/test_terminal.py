@@ -5,7 +5,6 @@ import os
 import re
 import shutil
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -20,7 +19,8 @@ from rig.errors import RigError
 from rig.tui import terminal as keyboard
 from rig.tui.stillness import STILL_S
 from tests.cli.lab import ROOT, assert_whole, short
-from tests.waiting import PATIENCE_S, until
+from tests.programs import run_program
+from tests.waiting import until
 
 _NEEDS_TMUX = pytest.mark.skipif(
     shutil.which("tmux") is None and not os.environ.get("CI"), reason="tmux is not installed"
@@ -35,11 +35,7 @@ class Terminal:
         self.socket = folder / "tmux"
 
     def tmux(self, *arguments: str) -> str:
-        done = subprocess.run(
-            ["tmux", "-S", str(self.socket), "-f", "/dev/null", *arguments],
-            capture_output=True, text=True, check=True, timeout=PATIENCE_S,
-        )  # fmt: skip
-        return done.stdout
+        return run_program("tmux", "-S", self.socket, "-f", "/dev/null", *arguments).stdout
 
     def begins(self, url: str) -> Path:
         """Open a new session of two runs and come to the first; return its file."""
@@ -71,7 +67,7 @@ class Terminal:
                 if text not in self.screen():
                     return True
                 self.press("Enter")
-            except subprocess.CalledProcessError:
+            except AssertionError:  # the program, and tmux with it
                 return True
             return False
 
@@ -102,7 +98,7 @@ def terminal(folder: Path) -> Iterator[Terminal]:
     yield found
     with suppress(RigError):  # it may have ended with the test
         os.kill(_daemon_of(folder), signal.SIGTERM)
-    subprocess.run(["tmux", "-S", str(found.socket), "kill-server"], check=False)
+    run_program("tmux", "-S", found.socket, "kill-server", code=None)
 
 
 @_NEEDS_TMUX
