@@ -27,20 +27,14 @@ from rig.recorder.controller import Controller
 from rig.recorder.interrupts import Interrupts
 from rig.recorder.published import EDGES_LIMIT, PublishedState
 from tests.refusals import refused
-from tests.tables import cases
+from tests.tables import cases, read_table
 from tests.waiting import PATIENCE_S
 
 ERRORS = [
-    errors.RigError("something"),
-    errors.InputError("a typo", "line 3"),
-    errors.SessionError("the disk is full", "free some space"),
-    errors.DeviceError("connection lost", "check the cable"),
-    errors.DeviceTimeoutError("silent"),
     DeviceRefusedError(RefusalReason.GATE_BLOCKED, 0b101),
     DeviceRefusedError(RefusalReason.NOT_ARMED, 0, DisarmReason.HOST_SILENT),
-    errors.ControlError("taken"),
     rig_error("stopped", text="stopped by Ada"),
-    errors.VersionError("old"),
+    *(getattr(errors, kind)(*words) for kind, *words in read_table(__file__, "errors")),
 ]
 
 

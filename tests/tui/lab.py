@@ -21,7 +21,9 @@ from textual._compositor import Compositor
 from textual.app import App
 from textual.pilot import Pilot
 
-from rig.campaign.machine import Stage
+from rig.campaign.machine import Flow, Stage
+from rig.reasons import plain_reason
+from rig.records import Job
 from rig.tui.actions import ACTIONS
 from rig.tui.app import RigApp
 from rig.tui.context import Options
@@ -48,6 +50,12 @@ raise SystemExit(main())
 """
 """One that takes no screen for lost which a busy machine leaves no time for a sign of life, and
 leaves other writers a gap soon."""
+
+
+def flow_of(stage: str, job: Any = None, reasons: Any = (), **more: Any) -> Flow:
+    """Make the flow that a row of ``moments.yaml`` says."""
+    why = tuple(map(plain_reason, reasons))
+    return Flow(Stage[stage], job and Job(*job), reasons=why, **more)
 
 
 @dataclass

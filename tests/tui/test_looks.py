@@ -13,34 +13,18 @@ import pytest
 
 from bench import pictures
 from bench.pictures import QUIET, SIZES, FakeClient, at_rest, draw, screenshots, seen
-from rig.campaign.machine import Flow, Stage
-from rig.reasons import plain_reason
-from rig.records import Job
 from rig.results.live import LiveAnalysis
 from rig.session.store import Session
 from rig.tui.app import THEMES, RigApp
 from rig.tui.context import Options
 from rig.tui.state import state_of
 from tests.cli.lab import short
-from tests.tui.lab import KEYS, colours_of, draw_without_pause, kept_session, text_of
+from tests.tables import read_table
+from tests.tui.lab import KEYS, colours_of, draw_without_pause, flow_of, kept_session, text_of
 
 THEME_NAMES = [theme.name for theme in THEMES]
 GOLDENS = Path(__file__).parent / "goldens"
-BLOCKED = {"gates": {"blocked": 1 << 3, "age_s": 0.1}}
-MOMENTS = {
-    "device": (Flow(Stage.DEVICE), BLOCKED),
-    "run": (Flow(Stage.PREPARE, Job(1, 1)), {}),
-    "trouble": (
-        Flow(Stage.PREPARE, Job(1, 2)),
-        {"link": {"state": "down", "error": {"message": "no such device"}, "retry_s": 2.0}},
-    ),
-    "session": (Flow(Stage.DONE), {}),
-    "help": (Flow(Stage.DEVICE), {}),
-    "note": (
-        Flow(Stage.RESULT, Job(1, 1), verdict="void", reasons=(plain_reason("[a gate] was lost"),)),
-        {},
-    ),
-}
+MOMENTS = read_table(__file__, "moments")["looks"]
 
 
 @pytest.fixture
@@ -96,11 +80,11 @@ def test_all_text_can_be_read_in_every_theme(moment, looks):
 
 async def _screens(moment, sizes, path, look, themes=THEME_NAMES[:1]):
     """Look at a moment in each size and theme; everything that was seen."""
-    flow, more = MOMENTS[moment]
+    row, more = MOMENTS[moment]
     whole = state_of(LiveAnalysis(path).read())
     state = replace(whole, sections={**QUIET, **more, "session": whole.sections["session"]})
     app = RigApp(Options(session=path), KEYS, FakeClient(state))
-    app.driver.flow = flow
+    app.driver.flow = flow_of(**row)
     found = []
     async with app.run_test(size=sizes[0]) as pilot:
         while app.follower.view is None or not app.follower.indicators.known:

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from textual import events
 
 from bench.pictures import QUIET, FakeClient
-from rig.campaign.machine import Flow, Stage
-from rig.records import Job
+from rig.campaign.machine import Stage
 from rig.results.live import LiveAnalysis
 from rig.session.store import Session
 from rig.tui.app import RigApp
@@ -20,20 +19,13 @@ from rig.tui.context import Options
 from rig.tui.state import state_of
 from tests.cli.lab import short
 from tests.examples import examples
-from tests.tui.lab import KEYS
+from tests.tables import read_table
+from tests.tui.lab import KEYS, flow_of
 from tests.waiting import PATIENCE_S
 
 STILL_S = 0.15
 SIZE = (80, 24)
-MOMENTS = {
-    "device": Flow(Stage.DEVICE),
-    "prepare": Flow(Stage.PREPARE, Job(1, 1), countdown_s=0.3),
-    "countdown": Flow(Stage.COUNTDOWN, Job(1, 1), left_s=60.0, countdown_s=60.0, token=1),
-    "live": Flow(Stage.LIVE, Job(1, 1)),
-    "result": Flow(Stage.RESULT, Job(1, 1), verdict="accepted"),
-    "halted": Flow(Stage.HALTED, Job(1, 1), verdict="void"),
-    "done": Flow(Stage.DONE, Job(1, 1)),
-}
+MOMENTS = {name: flow_of(**row) for name, row in read_table(__file__, "moments")["typing"].items()}
 PAGE_OF = {"device": "device", "result": "result", "halted": "result", "done": "session"}
 DIALOGS = ("", "ctrl+p", "question_mark", "n", "a", "q", "c", "l")
 

@@ -17,7 +17,7 @@ from rig.flash.drive import pico_ports
 from rig.usb.listing import KNOWN, Known, SerialPort, path_of, serial_number_at, serial_ports
 from tests.flash.pty_board import PtyBoard, info
 from tests.programs import run_program
-from tests.tables import cases
+from tests.tables import cases, read_table
 
 PACKAGING = Path(__file__).parents[2] / "packaging"
 
@@ -27,12 +27,7 @@ def plugged(monkeypatch):
     def plug(*infos):
         monkeypatch.setattr("serial.tools.list_ports.comports", lambda: list(infos))
 
-    plug(
-        info("/dev/ttyS0"),
-        info("/dev/ttyUSB0", 0x1A86, 0x7523, product="USB Serial"),
-        info("/dev/ttyUSB1", 0x1234, 0x5678, "X1", "Oscilloscope"),
-        info("/dev/ttyACM3", 0x2341, 0x0042, "85430", "Mega"),
-    )
+    plug(*(info(*port) for port in read_table(__file__, "ports")))
     return plug
 
 
