@@ -19,26 +19,16 @@ from rig.link.messages import TEST_RUN, Arm, Phase, pack_label
 from rig.recorder.controller import Controller
 from rig.recorder.published import PublishedState
 from tests.daemon.rig_in_a_box import Box, Trouble
+from tests.tables import read_table
 
-ACTIONS = [
-    (name, None)
-    for name in (
-        "arm", "fire_latest", "fire_first", "accept", "stop", "wait", "hang", "silence", "other",
-        "reset", "pull", "kill", "resume",
-    )
-]  # fmt: skip
+TABLE = read_table(__file__, "states")
+ACTIONS = [(name, None) for name in TABLE["actions"]]
 MOMENTS = 8  # more writes than any action has
 TROUBLES = [
     (action, Trouble(what, point, n))
-    for action in ("arm", "fire_latest", "resume")
+    for action in TABLE["troubled"]
     for n in range(1, MOMENTS + 1)
-    for what, points in {
-        "killed": ("write", "written", "commit", "committed"),
-        "unplugged": ("write",),
-        "deafened": ("written",),
-        "stopped": ("write", "written", "commit", "committed"),
-        "filled": ("commit",),
-    }.items()
+    for what, points in TABLE["troubles"].items()
     for point in points
 ]
 
