@@ -1,5 +1,6 @@
 """Data of the tests: what is tried and must come of it (`cases.yaml` of a folder), protocols."""
 
+import csv
 from functools import cache
 from pathlib import Path
 
@@ -20,6 +21,12 @@ def cases(test):
     """Parametrise a test by the table of its name; a table's first row names the arguments."""
     names, *rows = read_table(test.__code__.co_filename, "cases")[test.__name__]
     return pytest.mark.parametrize(names, rows)(test)
+
+
+def read_csv(path: Path) -> list[dict[str, str]]:
+    """Read the rows of a written table by the names that its first line gives."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
 
 
 def protocol_text(name: str) -> str:

@@ -5,14 +5,13 @@ A figure that was measured is written as a link to the page of docs/results in w
 given one (a setting, a limit, a dimension, an example), in ``given_figures.yaml`` with its origin.
 """
 
-import csv
 import re
 from functools import cache
 from pathlib import Path
 
 import pytest
 
-from tests.tables import read_table
+from tests.tables import read_csv, read_table
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "docs/results"
@@ -91,13 +90,9 @@ def tables(page: Path) -> list[list[str]]:
     return [[cell.strip() for cell in row.split("|")] for row in rows]
 
 
-def read_csv(name: str) -> list[dict[str, str]]:
-    return list(csv.DictReader((KEPT / name).read_text("utf-8").splitlines()))
-
-
 def test_fig_3_of_the_resolved_world_is_as_its_rows_say():
     told = {row[0]: row for row in tables(WORLD) if len(row) == 6}
-    rows = [row for row in read_csv("figure-3-resolved.csv")
+    rows = [row for row in read_csv(KEPT / "figure-3-resolved.csv")
             if f"{float(row['incline_deg']):g}°" in told]  # fmt: skip
     assert len(rows) == 12
     for row in rows:
@@ -109,7 +104,7 @@ def test_fig_3_of_the_resolved_world_is_as_its_rows_say():
 
 
 def test_other_tables_of_the_resolved_world_are_as_their_rows_say():
-    kept = {(row["what"], row["of"]): row for row in read_csv("resolved-published.csv")}
+    kept = {(row["what"], row["of"]): row for row in read_csv(KEPT / "resolved-published.csv")}
     looked = set()
     for row in tables(WORLD):
         for what, inclines in (("impulse over Eq. 9, rods", range(0, 90, 10)),

@@ -1,6 +1,5 @@
 """Studies for users: precision, stability, and what a scene leaves out; never how long it takes."""
 
-import csv
 import json
 import xml.etree.ElementTree as ET
 from dataclasses import replace
@@ -14,6 +13,7 @@ from rig.bench.references import own_error
 from rig.bench.scenes import ladder
 from rig.bench.stability import examine, of_fall
 from rig.bench.work import EPSILON, relative_error
+from tests.tables import read_csv
 
 
 @pytest.mark.parametrize("number", range(5))
@@ -45,8 +45,7 @@ def test_the_command_writes_all_of_it(tmp_path, monkeypatch, call):
     printed = call("bench", "precision", "--quick", "-o", tmp_path).out
     assert "left out: fit-0.5mm, Cholesky" in printed
     points = json.loads((tmp_path / "precision.json").read_text("utf-8"))["points"]
-    with (tmp_path / "precision.csv").open(newline="", encoding="utf-8") as stream:
-        rows = list(csv.DictReader(stream))
+    rows = read_csv(tmp_path / "precision.csv")
     assert [row["method"] for row in rows] == [point["method"] for point in points]
     assert all(0.0 < point["lower_s"] <= point["cpu_s"] <= point["upper_s"] for point in points)
     for picture in ("precision", "precision-fit-0.5mm", "precision-fall-time"):
@@ -101,8 +100,7 @@ def test_a_scene_gains_nothing_that_it_does_not_have(monkeypatch, call, tmp_path
     assert [scene["scene"] for scene in listed] == [*steps, "mine"]
     assert [scene["calls"]["g(θ)"] for scene in listed] == [0, 30, 1]
     assert listed[0]["calls"]["falls"] == 0
-    with (kept / "scenes.csv").open(encoding="utf-8", newline="") as file:
-        assert [line["scene"] for line in csv.DictReader(file)] == [*steps, "mine"]
+    assert [line["scene"] for line in read_csv(kept / "scenes.csv")] == [*steps, "mine"]
     assert (kept / "scenes.svg").read_text("utf-8").lstrip().startswith("<?xml")
 
 

@@ -1,6 +1,5 @@
 """Studies of the software: what they count is so, and each leaves its page and its table."""
 
-import csv
 import json
 import os
 
@@ -19,6 +18,7 @@ from rig.protocol.measurable import check_measurable
 from rig.protocol.reader import parse
 from sim.dials import Dials
 from tests.analysis.drops import UNIFORM, case
+from tests.tables import read_csv
 
 
 def test_a_plain_timer_is_near_on_a_perfect_rig():
@@ -127,8 +127,7 @@ def test_the_command_leaves_page_and_table(tmp_path, monkeypatch, capsys, here):
     assert "SIMULATED DATA" in capsys.readouterr().out
     whole = json.loads((tmp_path / "coverage.json").read_text())
     assert [*whole] == ["resolved", "model", "usual"]
-    with (tmp_path / "coverage.csv").open(newline="") as table:
-        rows = list(csv.DictReader(table))
+    rows = read_csv(tmp_path / "coverage.csv")
     assert [row["number"] for row in rows] == ["1", "2"] * 3
     page = (tmp_path / "coverage.md").read_text("utf-8")
     assert "worst tenth, fewest held:" in page
@@ -165,8 +164,7 @@ def test_figures_with_resolved_falls(number, lines, tmp_path, monkeypatch):
     )
     monkeypatch.setattr(resolved_paper, "INCLINES", tuple(10.0 * n for n in range(9)))
     assert main(["resolved", "--paper", str(number), "-o", str(tmp_path)]) == 0
-    with (tmp_path / f"figure-{number}-resolved.csv").open(newline="") as table:
-        rows = list(csv.DictReader(table))
+    rows = read_csv(tmp_path / f"figure-{number}-resolved.csv")
     assert len(rows) == lines
     if number == 3:
         assert [float(rows[8][name]) for name in ("separation_m", "separation_sd_m")] == [

@@ -163,6 +163,12 @@ def test_only_what_was_armed_and_counted_down_without_a_stop_is_fired(happening,
 PASSING = (RefusalReason.COOLING, RefusalReason.GATE_BLOCKED, RefusalReason.STOPPED)
 
 
+TRIED_AGAIN = {
+    RefusalReason.GATE_BLOCKED, RefusalReason.GATE_UNSTEADY, RefusalReason.NOT_ARMED,
+    RefusalReason.STOPPED,
+}  # fmt: skip
+
+
 def arming(**more):
     return through(Flow(stage=Stage.PREPARE, **more), on.GoOn(JOB, 5.0), DONE)[0]
 
@@ -183,22 +189,11 @@ def test_alone_what_passes_is_waited_for_a_few_times(reason):
 def test_what_is_not_let_go_is_switched_off_first(reason, attended):
     flow = Flow(stage=Stage.PREPARE, attended=attended)
     for number in range(1, LOOKS + 1):
-        flow, effects = through(
-            flow,
-            on.GoOn(JOB),
-            DONE,
-            on.EffectDone(-1, 7),
-            on.Tick(9.0),
-            on.EffectFailure(-1, "a gate moved\nhint", reason),
-        )
+        fired = on.GoOn(JOB), DONE, on.EffectDone(-1, 7), on.Tick(9.0)
+        failed = on.EffectFailure(-1, "a gate moved\nhint", reason)
+        flow, effects = through(flow, *fired, failed)
         assert (flow.stage, effects[3]) == (Stage.PREPARE, on.Stop("a gate moved"))
-        again = {
-            RefusalReason.GATE_BLOCKED,
-            RefusalReason.GATE_UNSTEADY,
-            RefusalReason.NOT_ARMED,
-            RefusalReason.STOPPED,
-        }
-        over = reason not in again or (number == LOOKS and not attended)
+        over = reason not in TRIED_AGAIN or (number == LOOKS and not attended)
         assert effects[4:] == ([on.GiveUp()] if over else [])
 
 

@@ -1,6 +1,5 @@
 """Tables and numbers for notebooks, of one session and of several."""
 
-import csv
 import sys
 
 import pytest
@@ -9,6 +8,7 @@ import rig
 from rig.bundle.tables import column_unit
 from rig.errors import InputError
 from tests.cli.lab import PROTOCOLS, record
+from tests.tables import read_csv
 
 pytestmark = pytest.mark.usefixtures("analysed_once")
 
@@ -23,8 +23,7 @@ def ball(analysed_once, tmp_path_factory):
 def test_a_frame_has_the_columns_of_the_exported_file_and_their_units(table, ball, call, tmp_path):
     pytest.importorskip("pandas")
     call("export", ball, "--csv", tmp_path)
-    with (tmp_path / f"{table}.csv").open(encoding="utf-8", newline="") as file:
-        rows = [*csv.DictReader(file)]
+    rows = read_csv(tmp_path / f"{table}.csv")
     frame = rig.open(ball).analyze().to_frame(table)
     assert frame.attrs["simulated"] is True
     whole = frame.reset_index(drop=table != "runs")

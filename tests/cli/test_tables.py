@@ -1,21 +1,15 @@
 """The export: what the scene has, in files other programs read."""
 
-import csv
 import json
 import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from rig.reasons import plain_reason
 from rig.session.schema import RunState
 from rig.session.store import Session
-
-
-def rows(path: Path) -> list[dict[str, str]]:
-    with path.open(newline="") as stream:
-        return list(csv.DictReader(stream))
+from tests.tables import read_csv
 
 
 def test_all_files(fences, call, tmp_path):
@@ -29,12 +23,13 @@ def test_all_files(fences, call, tmp_path):
     place = tmp_path / "deep" / "out"
     for _ in range(2):  # the second time replaces
         call("export", copy, "--csv", place)
-    runs = [(row["run"], row["attempt"], row["superseded"]) for row in rows(place / "runs.csv")]
+    runs = [(row["run"], row["attempt"], row["superseded"]) for row in read_csv(place / "runs.csv")]
     assert runs[:3] == [("1", "1", "0"), ("2", "1", "1"), ("2", "2", "0")]
-    said = rows(place / "states.csv")
+    said = read_csv(place / "states.csv")
     assert [row["state"] for row in said] == [entry.state for entry in states]
     assert said[-1]["reasons"] == 'lost edges; say "no", twice'
-    assert [int(row["tick"]) for row in rows(place / "pings.csv")] == [one.tick for one in pings]
+    ticks = [int(row["tick"]) for row in read_csv(place / "pings.csv")]
+    assert ticks == [one.tick for one in pings]
     readme = (place / "README.txt").read_text("utf-8")
     assert readme.startswith("SIMULATED DATA")
     assert "  gravity_m_s2: [m/s²] " in readme
@@ -54,7 +49,7 @@ def test_a_table_has_the_columns_of_its_scene_and_the_values_of_json(
     found = json.loads(call("analyze", session, "--json").out)
     struck = {"incline_deg", "impact_chain", "separation_m"}
     for table in ("runs", "summary"):
-        lines = rows(tmp_path / f"{table}.csv")
+        lines = read_csv(tmp_path / f"{table}.csv")
         columns = set(lines[0])
         assert columns & struck == (struck if scene == "finished" else set()) - (
             {"impact_chain"} if table == "summary" else set()

@@ -37,7 +37,7 @@ from tests.analysis.drops import PROTOCOLS, UNIFORM, case, made_up
 from tests.analysis.test_datum_board import BOARD_GRADED
 from tests.refusals import refused
 from tests.report import fake_analysis
-from tests.tables import cases
+from tests.tables import cases, read_csv
 
 TWO = fake_analysis.two_chains()
 CURVES = model_curves(UNIFORM)
@@ -189,8 +189,7 @@ def test_a_figure_its_numbers_and_its_caption(number, own, other, tmp_path):
     caption = " ".join("".join(ET.parse(target).getroot().itertext()).split())
     assert own in caption
     assert other not in caption
-    with target.with_suffix(".csv").open(newline="") as stream:
-        rows = list(csv.DictReader(stream))
+    rows = read_csv(target.with_suffix(".csv"))
     assert len(rows) > 20
     assert all(float(value) == float(value) for row in rows for value in row.values())
 

@@ -215,16 +215,19 @@ class Lab:
     ) -> AsyncIterator[Operator]:
         """Sit down with the first run prepared."""
         async with self.operator(size, countdown_s) as operator:
-            await operator.until(lambda: operator.app.client and operator.app.client.driving)
             await operator.until(lambda: operator.app.desk.chosen)
-            await operator.press("enter")
-            await operator.at(Stage.DEVICE)
-            await operator.until(
-                lambda: operator.app.follower.view and operator.app.follower.indicators.known
-            )
+            await session_on(operator)
             await operator.press("enter")
             await operator.at(Stage.PREPARE)
             yield operator
+
+
+async def session_on(op: Operator) -> None:
+    """Have a session on the disk, and all that is known of its board shown."""
+    await op.until(lambda: op.app.client and op.app.client.driving)
+    await op.press("enter")
+    await op.at(Stage.DEVICE)
+    await op.until(lambda: op.app.follower.view and op.app.follower.indicators.known)
 
 
 def unseen(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ import pytest
 from rig.campaign.machine import Stage
 from rig.tui import app, client
 from tests.cli.lab import drops_of
-from tests.tui.lab import PATIENCE_S, text_of
+from tests.tui.lab import PATIENCE_S, session_on, text_of
 
 
 def test_all_that_waits_before_a_hanging_daemon_is_said_is_less_than_a_second():
@@ -84,13 +84,6 @@ async def mended(op):
     await op.until(lambda: op.app.follower.state.section("session"))
 
 
-async def session_on(op):
-    await op.until(lambda: op.app.client.driving and op.app.follower.state.link == "up")
-    await op.press("enter")
-    await op.at(Stage.DEVICE)
-    await op.until(lambda: op.app.follower.view and op.app.follower.indicators.known)
-
-
 async def test_a_pulled_cable_is_said_on_every_screen(cabled):
     processes, lab = cabled
 
@@ -99,6 +92,7 @@ async def test_a_pulled_cable_is_said_on_every_screen(cabled):
         pull(processes, lab)  # before there is a session
         await op.sees(*PULLED, "HOME")
         plug(processes)
+        await op.until(lambda: op.app.follower.state.link == "up")
         await session_on(op)
         pull(processes, lab)
         for page in "123456":
@@ -120,6 +114,7 @@ def test_a_drop_that_falls_without_its_line_is_found_when_it_is_back(cabled, fau
 
     async def work():
         async with lab.operator(countdown_s=0.1) as op:
+            await op.until(lambda: op.app.follower.state.link == "up")
             await session_on(op)
             await op.press("enter")
             await op.arms(Stage.LIVE)
