@@ -119,7 +119,7 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
         file.problems.refuse(rows[0].line, 1, "too_many_columns", columns=width, limit=_WIDEST)
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
     facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
-    heading = block.find_heading(width)
+    heading = block.find_heading(width, facts)
     is_counted = facts.keys() >= {0, width - 1} and "counts" in facts[0]
     if heading and is_counted and len(heading.texts) < width:
         heading = heading._replace(texts=["", *heading.texts])  # numbers of rows have no name
@@ -130,7 +130,7 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     columns = [_read_column(block, heading, n, facts[n] | shared, cells[n]) for n in facts]
     if heading is None:
         for row in block.headings:
-            if row.known > 1 and len(row.texts) > width:
+            if row.count_known() > 1 and len(row.texts) > width:
                 file.problems.refuse(row.line, 1, "heading_unfit", columns=width)
         inputs = [column for column in columns if column.role in SAMPLED]
         for column, name in zip(inputs, block.find_inputs(len(inputs)), strict=False):

@@ -12,8 +12,9 @@ import itertools
 import re
 import string
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from operator import itemgetter
 from typing import NamedTuple
 
 from rig.timers import vocabulary
@@ -75,25 +76,31 @@ class RowBlock:
             self.headings += self.above
         self.key = width, *(tuple(row.texts) for row in self.headings)
 
-    def find_heading(self, width: int) -> Row | None:
+    def find_heading(self, width: int, filled: Collection[int]) -> Row | None:
         """Return the row with most cells that are known, the lowest of those with most names.
 
-        Above and below may stand symbols and units.
+        Above and below may stand symbols and units. Above settings, rows with a measured number,
+        only a row that names every column is no setting itself; nor is one with more or fewer names
+        than there are columns. A remark may name the columns where nothing else does.
 
-        A row with a measured number, or with more or fewer names than there are columns, is a
-        setting. A remark may name the columns where nothing else does.
+        Parameters
+        ----------
+        filled
+            Columns that have values.
         """
         is_numbered = form("time and numbers").fullmatch
         remarks = (row for row in self.remarks if not form("assignment").search(row.texts[0]))
-        rows = [
-            row
-            for row in self.headings or [row for row in remarks if len(row.texts) == width]
-            if row.known
-            and len(row.texts) > width - 2  # rows may end with a separator
-            and all(_UNFILLED & roles_in(text) for text in filter(None, row.texts[width:]))
-            and (is_numbered(row.raw) or not any(map(_is_value, row.texts[:width])))
-        ]
-        return max(reversed(rows), key=lambda row: (row.known, len({*row.texts})), default=None)
+        ranked = list[tuple[int, int, Row]]()
+        for row in self.headings or [row for row in remarks if len(row.texts) == width]:
+            if any(map(_is_value, row.texts)) and not is_numbered(row.raw):
+                ranked = [rank for rank in ranked if rank[0] >= len(filled)]
+            elif (
+                (known := row.count_known(filled))
+                and len(row.texts) > width - 2  # rows may end with a separator
+                and all(_UNFILLED & roles_in(text) for text in filter(None, row.texts[width:]))
+            ):
+                ranked.append((known, len({*row.texts}), row))
+        return max(reversed(ranked), key=itemgetter(0, 1), default=(None,))[-1]
 
     def find_time_base(self) -> TimeBase | None:
         """Return the first sample's time and the step, s, that settings state; `None` without."""
@@ -132,11 +139,14 @@ class Row(NamedTuple):
         """Return what a column, from 0, has; nothing where the row has no such."""
         return self.texts[at] if 0 <= at < len(self.texts) else ""
 
-    @property
-    def known(self) -> int:
-        """How many cells say what a column is."""
-        roles = [{*_COLUMN_ROLES & roles_in(x), vocabulary.unit_of(x)} - {""} for x in self.texts]
-        return sum(map(bool, roles)) if set().union(*roles) - {"derived", "index"} else 0
+    def count_known(self, columns: Collection[int] | None = None) -> int:
+        """Count the cells, of some columns or of all, that say what a column is."""
+        texts = [text for n, text in enumerate(self.texts) if columns is None or n in columns]
+        roles = [{*_COLUMN_ROLES & roles_in(x), vocabulary.unit_of(x)} - {""} for x in texts]
+        is_heading = set().union(*roles) - {"derived", "index"} and "units" not in roles_in(
+            texts[0]
+        )
+        return sum(map(bool, roles)) if is_heading else 0
 
     @property
     def is_mark(self) -> bool:
@@ -237,7 +247,7 @@ class Table:
         if any(map(is_number, row.texts)):  # most are rows
             return not row.raw[:1].isdigit() and row.is_mark
         is_again = row.texts in [above.texts for above in row.block.headings]
-        return is_again or row.is_mark or 0 < len(row.texts) <= 2 * row.known
+        return is_again or row.is_mark or 0 < len(row.texts) <= 2 * row.count_known()
 
     def _is_row(self, row: Row) -> bool:
         """Whether it has values only, and at least a number or a date, or looks as if it had."""
@@ -248,7 +258,7 @@ class Table:
         if is_data and all(map(kinds_of, filter(None, row.texts))):
             return True
         # One of data with a fault: some of it is a number, as in those above, or below their names.
-        above = (x.texts for x in row.block.headings if len(x.texts) == x.known)
+        above = (x.texts for x in row.block.headings if len(x.texts) == x.count_known())
         widths = {row.block.width, *map(len, above)}
         return any(map(is_number, row.texts)) and len(row.texts) in widths
 
