@@ -170,7 +170,7 @@ def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
         column.role = role
     for column in columns:
         column.role = meant.get(column.role, column.role)
-        file.has_unit &= column.role != "time" or column.power is not None
+        file.powers |= {column.power} if column.role == "time" else set()
 
 
 def _read_column(

@@ -24,7 +24,7 @@ from rig.timers.moments import LONGEST_DROP, TICK_HZ
 from rig.timers.problems import refusal
 from rig.timers.signals import read_file
 from rig.timers.timer_file import TimerFile
-from rig.timers.vocabulary import POWERS, form
+from rig.timers.vocabulary import POWERS, SYMBOLS, form
 
 Fit = Callable[[FileReading, bool], "FallMatch"]
 
@@ -281,6 +281,9 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
         for name, value in pairs.items():
             if name in settings and form(f"setting {name}").fullmatch(value):
                 stated[name] = value
+                if name == "unit" and file.has_unit and POWERS[value] not in file.powers:
+                    units = " and ".join(sorted(SYMBOLS[power] for power in file.powers)) or "s"
+                    raise refusal(place, "unit_contradicts", unit=value, units=units)
             elif name in settings:
                 raise refusal(place, "layout_unclear", text=f"{name}={value:.40}")
             elif name not in inputs:

@@ -98,7 +98,7 @@ class SignalReader:
         base = (0.0, 1.0) if self.clocks[0].role == "time" else block.find_time_base()
         if base is None:
             file.problems.refuse(sample[0].line, 1, "no_rate", lacks="a column of times or a rate")
-        self.base = base
+        self.base, self.latest = base, dict[int, int]()
         used = {column.role for column in columns}
         filled = {x.at: sum(row.cell(x.at) != "" for row in sample) for x in columns}
         values = [filled[at] for _, value, *_ in self.signals if (at := value.at) in filled]
@@ -123,7 +123,7 @@ class SignalReader:
     def read(self, block: RowBlock, rows: Iterator[Row]) -> Changes:
         """Return the changes that rows say; a row may say that nothing changes, or be unread."""
         file, self.block, self.count = self.file, block, 0
-        self.starts, self.latest = dict[int, int](), dict[int, int]()
+        self.starts = dict[int, int]()
         self.states = dict[tuple[int, int, int], int]()
         self.changes, self.samples = list[Any](), [array("d") for _ in self.signals]
         for row in rows:
@@ -144,8 +144,8 @@ class SignalReader:
                 self._find_crossings(n, row)
         silent = self.count - len({change[0] for change in self.changes})
         if self.is_sampled and 2 * silent > self.count:
-            lasting = max(self.latest.values(), default=0) - min(self.starts.values(), default=0)
-            file.period = lasting // max(1, self.count - 1)
+            lasting = [self.latest[at] - start for at, start in self.starts.items()]
+            file.period = max(lasting, default=0) // max(1, self.count - 1)
         return np.array(self.changes, CHANGE)
 
     def _read_time(self, row: Row, clock: TimerColumn) -> int | None:
@@ -161,11 +161,11 @@ class SignalReader:
             return None
         if clock.role != "time":
             tick = round(self.base[0] * TICK_HZ + self.base[1] * tick)
-        latest = self.latest.get(clock.at, tick)
+        latest = self.latest.get(clock.at, tick)  # of the block above, too: a counter goes on
         for wrap in OVERFLOWS_PS.get(clock.power, ()) if tick < latest else ():
             pause = (tick - latest) % wrap
             tick = latest + pause if pause < _TURN else tick
-        if self.is_sampled and tick < latest:
+        if self.is_sampled and clock.at in self.starts and tick < latest:
             self.file.problems.add(*row.place(clock.at), "time", "backwards", text=text)
         self.starts.setdefault(clock.at, tick)
         self.latest[clock.at] = tick

@@ -30,8 +30,9 @@ _COLUMN_ROLES = {
 }
 _UNFILLED = {"setting", "index", "derived"}
 """Roles of columns that may have a name and no values: a rate, comments, or distances."""
-_UNITS = vocabulary.POWERS | {"khz": -3, "mhz": -6, "ghz": -9}
-"""Decimal power from seconds, or from hertz."""
+_RATES = itertools.product({"": 0, "k": -3, "m": -6, "g": -9}.items(), ("hz", "sps", "s/s", "sa/s"))
+_UNITS = vocabulary.POWERS | {"": 0} | {prefix + unit: x for (prefix, x), unit in _RATES}
+"""Decimal power from seconds, or from hertz and samples in a second."""
 _JUDGED = 100
 """Lines in which values are counted."""
 _SAMPLE = 500
@@ -107,14 +108,16 @@ class RowBlock:
         stated, rows = dict[str, float](), [*self.remarks, *self.headings]
         for above, below in itertools.pairwise([*rows, *rows[-1:]]):
             for n, text in enumerate(above.texts):
-                name, *inside = form("assignment").split(text[:60], 1)
-                places = map(str.strip, (*inside, above.cell(n + 1), below.cell(n)))
-                quantity = next(filter(None, map(form("quantity").fullmatch, places)), None)
+                mark = form("before a value").search(text := text[:60])
+                name, inside = (text[: mark.start()], text[mark.end() :]) if mark else (text, "")
                 role = next((x for x in ("rate", "start", "step") if x in roles_in(name)), "")
-                if role and quantity:
-                    number, unit = quantity[1].replace(",", "."), quantity[2].lower()
-                    power = _UNITS.get(vocabulary.unit_of(unit) or unit, 0)
-                    stated.setdefault(role, float(number) / 10.0**power)
+                places = (x.strip().lower() for x in (inside, above.cell(n + 1), below.cell(n)))
+                quantities = filter(None, map(form("quantity").fullmatch, places if role else ()))
+                for number, unit in (quantity.groups() for quantity in quantities):
+                    power = _UNITS.get(vocabulary.unit_of(unit) or unit)
+                    if power is not None:
+                        value = float(number.replace(",", "."))
+                        stated.setdefault(role, value / 10.0**power)
         step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
         return (stated.get("start", 0.0), step) if step else None
 

@@ -48,8 +48,9 @@ class TimerFile:
     period
         Of samples that are all as far apart, so that a row may have several changes: no edge is
         known better than that, ps; `None` for others.
-    has_unit
-        Whether it says the unit of its times; those without are kept as if they were seconds.
+    powers
+        Of its times, from seconds; `None` where it does not say the unit of some, which are kept as
+        if they were seconds.
     is_sampled
         Whether it has samples: a level that changes may be of an input that is no gate.
     is_wide
@@ -77,7 +78,7 @@ class TimerFile:
     names: dict[str, int] = field(default_factory=lambda: {"": 0})
     changes: Changes = field(default_factory=lambda: np.empty(0, CHANGE))
     period: int | None = None
-    has_unit: bool = True
+    powers: set[int | None] = field(default_factory=set)
     is_sampled: bool = False
     is_wide: bool = False
     is_guess: bool = False
@@ -91,6 +92,11 @@ class TimerFile:
     def __post_init__(self) -> None:
         """Begin without faults."""
         self.problems = ProblemList(str(self.path), make_reason("timer_files").text)
+
+    @property
+    def has_unit(self) -> bool:
+        """Whether it says the unit of its times."""
+        return None not in self.powers
 
     @property
     def is_stacked(self) -> bool:
