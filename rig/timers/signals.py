@@ -108,6 +108,8 @@ class SignalReader:
         self.above = {x: "" for x, at in self.places.items() if 2 * filled[at] <= len(sample)}
         self.is_sampled = "volts" in used or ("level" in used and is_filled)
         self.is_whole = is_filled and (self.is_sampled or len(values) > len(self.clocks))
+        is_level = self.is_sampled and "volts" not in used and not self.places
+        self.levels = [value.at for _, value, *_ in self.signals] if is_level else []
         needed = {x.at for signal in self.signals for x in signal[:2]} | {*self.places.values()}
         unused = (x.name for x in columns if x.role != "index" and x.at not in needed)
         self.unused = ", ".join(unused)
@@ -124,12 +126,19 @@ class SignalReader:
         """Return the changes that rows say; a row may say that nothing changes, or be unread."""
         file, self.block, self.count = self.file, block, 0
         self.starts = dict[int, int]()
+        self.names = [self._names_of(n, Row(0, [])) for n in range(len(self.signals))]
         self.states = dict[tuple[int, int, int], int]()
         self.changes, self.samples = list[Any](), [array("d") for _ in self.signals]
+        self.words: list[str] | None = None
         for row in rows:
             ticks = {clock.at: self._read_time(row, clock) for clock in self.clocks}
-            said = [self._read_value(n, row, ticks[x.clock.at]) for n, x in enumerate(self.signals)]
-            file.unread += [] if any(said) else [row.line]
+            words = [row.cell(at) for at in self.levels]
+            if not words or words != self.words or None in ticks.values():
+                self.words = words
+                said = [
+                    self._read_value(n, row, ticks[x.clock.at]) for n, x in enumerate(self.signals)
+                ]
+                file.unread += [] if any(said) else [row.line]
             self.count += 1
             if len(self.changes) > MAX_EVENTS:
                 file.problems.refuse(row.line, 1, "too_many_events", limit=MAX_EVENTS)
@@ -153,11 +162,11 @@ class SignalReader:
 
         Rows of samples without times are at a stated rate.
         """
-        text = row.cell(clock.at) if clock.at >= 0 else str(self.count)
-        tick = moment(text, clock.power or 0)
-        if tick is None and text:
-            self._reject(row, clock, text)
+        text, is_counted = row.cell(clock.at), clock.at < 0
+        tick = self.count * TICK_HZ if is_counted else moment(text, clock.power or 0)
         if tick is None:
+            if text:
+                self._reject(row, clock, text)
             return None
         if clock.role != "time":
             tick = round(self.base[0] * TICK_HZ + self.base[1] * tick)
@@ -183,7 +192,7 @@ class SignalReader:
         elif state == _REJECTED:
             self._reject(row, value, word)
         elif state or not self.is_sampled:
-            names = self._names_of(n, row)
+            names = self._names_of(n, row) if self.places else self.names[n]
             before = self.states.get((n, *names))
             self.states[n, *names] = state
             if not self.is_whole or before != state:
@@ -226,7 +235,7 @@ class SignalReader:
 
     def _reject(self, row: Row, column: TimerColumn, text: str) -> None:
         """Note a cell whose value is not accepted."""
-        accepted = roles()[column.role][1]
+        self.words, accepted = None, roles()[column.role][1]
         self.file.problems.reject(*row.place(column.at), column.role, text, accepted)
 
 
