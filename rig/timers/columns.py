@@ -270,7 +270,7 @@ def pair_columns(columns: Sequence[TimerColumn]) -> list[Signal]:
     for clock in times:
         own = [column for column in columns if _clock_of(column, times) is clock]
         values = [column for column in own if column.role in chosen]
-        if not values and not is_sampled:
+        if not chosen:
             values = [replace(clock, at=ROW_COUNT.at, role="moment")]
         labels = Counter(map(_label_of, values))
         for n, value in enumerate(values, 1):

@@ -201,7 +201,10 @@ def _refuse_impossible(reading: FileReading, place: str) -> None:
     if is_wire and "groups" not in file.stated:
         raise refusal(place, "one_wire", option=str(layout))
     earlier: dict[object, int] = {}
-    for drop in drops:
+    for n, drop in enumerate(drops):
+        lines = tuple(reading.line[slice(*reading.places[n:][:2])].tolist())
+        if layout.pause_s and (other := earlier.setdefault(lines, drop.run)) != drop.run:
+            raise refusal(place, "same_twice", run=drop.run, other=other)  # another clock's
         # Of coarse times those of a whole drop are a copy's; of fine ones, rows may be missing.
         is_coarse = all(edge.tick % _COARSE == 0 for edge in drop.edges)
         moments: set[object] = {drop.edges} if is_coarse else {*drop.edges}

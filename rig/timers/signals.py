@@ -94,6 +94,7 @@ class SignalReader:
     def __init__(self, file: TimerFile, block: RowBlock, sample: list[Row]) -> None:
         columns = columns_of(file, block, sample)
         self.file, self.signals = file, pair_columns(columns)
+        self.width = max(len(row.texts) for row in sample)
         self.clocks = list(dict.fromkeys(signal.clock for signal in self.signals))
         base = (0.0, 1.0) if self.clocks[0].role == "time" else block.find_time_base()
         if base is None:
@@ -132,13 +133,14 @@ class SignalReader:
         self.words: list[str] | None = None
         for row in rows:
             ticks = {clock.at: self._read_time(row, clock) for clock in self.clocks}
-            words = [row.cell(at) for at in self.levels]
-            if not words or words != self.words or None in ticks.values():
+            words = [row.cell(at) for at in self.levels] + row.texts[self.width :]
+            if not self.levels or words != self.words or None in ticks.values():
                 self.words = words
                 said = [
                     self._read_value(n, row, ticks[x.clock.at]) for n, x in enumerate(self.signals)
                 ]
-                file.unread += [] if any(said) else [row.line]
+                is_read = any(said) and not any(row.texts[self.width :])
+                file.unread += [] if is_read else [row.line]
             self.count += 1
             if len(self.changes) > MAX_EVENTS:
                 file.problems.refuse(row.line, 1, "too_many_events", limit=MAX_EVENTS)
