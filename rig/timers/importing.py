@@ -215,9 +215,9 @@ def _refuse_impossible(reading: FileReading, place: str) -> None:
                 raise refusal(place, "same_twice", run=drop.run, other=run)
     # Of changes alone, two in a row mean that the row of the first is missing.
     changes = Counter(zip(reading.line.tolist(), reading.tick, strict=True))
-    lines = [line for (line, _), count in changes.items() if count > 1]
-    if lines and file.period is None:  # regular samples see changes together
-        raise refusal(place, "at_once", lines=_some(lines))
+    at_once = [line for (line, _), count in changes.items() if count > 1]
+    if at_once and file.period is None:  # regular samples see changes together
+        raise refusal(place, "at_once", lines=_some(at_once))
 
 
 def _account(reading: FileReading, options: Namespace) -> Reason:
