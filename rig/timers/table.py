@@ -204,17 +204,13 @@ class Table:
         """Split a line into cells; numbers get a decimal point, and what is missing is empty."""
         if not self.separator:
             values = dict(_named_values(line))
-            is_one = values and not self._has_several(line)
-            return [values.get(name, "") for name in self._names] if is_one else [line]
+            several = {(name, 0) for name, count in values.keys() - self._names if count}
+            is_row = values and several.isdisjoint(self._names)
+            return [values.get(name, "") for name in self._names] if is_row else [line]
         cells = split_cells(line, self.separator, len(self._usual))
         missing, has_comma = vocabulary.words()["missing"], form("decimal comma").fullmatch
         cells = ["" if text[:5].casefold() in missing else text for text in cells]
         return [text.replace(",", ".") if has_comma(text[:LONGEST]) else text for text in cells]
-
-    def _has_several(self, line: str) -> bool:
-        """Whether a line has several rows: values with names that others have once."""
-        again = {(name, count) for name, count in dict(_named_values(line)) if count}
-        return any((name, 0) in self._names for name, _ in again.difference(self._names))
 
     def rows(self) -> Iterator[Row]:
         """Yield each row of data."""
@@ -242,8 +238,11 @@ class Table:
             elif any(row.texts):
                 if len(block.headings) > _SAMPLE:
                     return
-                is_stray = block.width or self._has_several(line)
-                (self.strays if is_stray else block.headings).append(row)
+                # What has a value as rows have it, and half as many as they, is no heading.
+                names = [name for name, _ in _named_values(line)] if self._names else []
+                is_like = any(name in self._names for name in names if name[0])
+                is_broken = is_like and 2 * len(names) > len(self._names)
+                (self.strays if block.width or is_broken else block.headings).append(row)
 
     def _next_block(self, last: RowBlock, mark: str) -> RowBlock:
         """Return the block below a mark; a run or gate goes on until a mark names another."""
