@@ -91,13 +91,12 @@ class Signal(NamedTuple):
         Of its times, or of the numbers of its samples.
     value
         Its states, levels or volts; itself as moments where the heading says what happened.
-    run, label
-        What the file calls the run and the input; empty where it does not say.
+    label
+        What the file calls the input; empty where it does not say.
     """
 
     clock: TimerColumn
     value: TimerColumn
-    run: str
     label: str
 
 
@@ -277,7 +276,7 @@ def pair_columns(columns: Sequence[TimerColumn]) -> list[Signal]:
             is_beside = is_sampled or len(values) > 1
             label = _label_of(value) if is_beside else clock.gate or value.gate
             label += f" ({n})" if is_sampled and labels[label] > 1 else ""
-            pairs.append(Signal(clock, value, clock.run or value.run, label))
+            pairs.append(Signal(clock, value, label))
     return pairs
 
 

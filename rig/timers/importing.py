@@ -181,7 +181,7 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
         proposed = list(dict.fromkeys(str(x.layout) for x in [*likely, *is_open]))[:3]
         options = "; ".join([*proposed, "--as-read"])
         values = {"share": 100 * match.share, "run": best.runs[match.worst], "options": options}
-        line = best.line[slice(*best.places[match.worst :][:2])].min()
+        line = best.line[best.part(match.worst)].min()
         raise refusal(f"{place}:{line}:1", "no_reading_fits", **values)
     (match, reading), *rest = ranked
     rivals = [row for row in rest if row[1].layout.first == reading.layout.first]
@@ -202,7 +202,7 @@ def _refuse_impossible(reading: FileReading, place: str) -> None:
         raise refusal(place, "one_wire", option=str(layout))
     earlier: dict[object, int] = {}
     for n, drop in enumerate(drops):
-        lines = tuple(reading.line[slice(*reading.places[n:][:2])].tolist())
+        lines = tuple(reading.line[reading.part(n)].tolist())
         if layout.pause_s and (other := earlier.setdefault(lines, drop.run)) != drop.run:
             raise refusal(place, "same_twice", run=drop.run, other=other)  # another clock's
         # Of coarse times those of a whole drop are a copy's; of fine ones, rows may be missing.
@@ -284,7 +284,7 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
         for name, value in pairs.items():
             if name in settings and form(f"setting {name}").fullmatch(value):
                 stated[name] = value
-                if name == "unit" and file.has_unit and POWERS[value] not in file.powers:
+                if name == "unit" and {None, POWERS[value]}.isdisjoint(file.powers):
                     units = " and ".join(sorted(SYMBOLS[power] for power in file.powers)) or "s"
                     raise refusal(place, "unit_contradicts", unit=value, units=units)
             elif name in settings:

@@ -147,10 +147,13 @@ class FileReading:
         """The drops, a run each."""
         return [self.drop(n) for n in range(len(self.runs))]
 
+    def part(self, n: int) -> slice:
+        """Return where the edges of the n-th drop are."""
+        return slice(*self.places[n : n + 2])
+
     def drop(self, n: int) -> Drop:
         """Return the n-th drop."""
-        part = slice(*self.places[n : n + 2])
-        columns = (x[part].tolist() for x in (self.tick, self.channel, self.blocked))
+        columns = (x[self.part(n)].tolist() for x in (self.tick, self.channel, self.blocked))
         return make_drop(self.runs[n], zip(*columns, strict=True))
 
     @property
@@ -243,7 +246,7 @@ def find_layouts(file: TimerFile, gates: Sequence[int], bars: int) -> Iterator[F
     levels = ["high", "low"] if is_signal else ["states", "inverted"]
     # More times than bars: it darkens and clears in turns.
     times = ["turns", "turns-clear", "each"] if most > bars else ["each", "turns", "turns-clear"]
-    choices: dict[str, Sequence[Any]] = {} if file.has_unit else {"unit": list(POWERS)}
+    choices: dict[str, Sequence[Any]] = {"unit": list(POWERS)} if None in file.powers else {}
     choices["dark"] = levels if np.any(state) else times
     choices["groups"] = groups
     choices["first"] = ["state", "change"] if np.any(file.changes["first"]) else ["state"]

@@ -127,7 +127,6 @@ class SignalReader:
         """Return the changes that rows say; a row may say that nothing changes, or be unread."""
         file, self.block, self.count = self.file, block, 0
         self.starts = dict[int, int]()
-        self.names = [self._names_of(n, Row(0, [])) for n in range(len(self.signals))]
         self.states = dict[tuple[int, int, int], int]()
         self.changes, self.samples = list[Any](), [array("d") for _ in self.signals]
         self.words: list[str] | None = None
@@ -194,7 +193,7 @@ class SignalReader:
         elif state == _REJECTED:
             self._reject(row, value, word)
         elif state or not self.is_sampled:
-            names = self._names_of(n, row) if self.places else self.names[n]
+            names = self._names_of(n, row)
             before = self.states.get((n, *names))
             self.states[n, *names] = state
             if not self.is_whole or before != state:
@@ -205,8 +204,8 @@ class SignalReader:
 
     def _names_of(self, n: int, row: Row) -> tuple[int, int]:
         """Return what the run and the input are called: in the row, its heading or a mark above."""
-        signal, block = self.signals[n], self.block
-        names = {"run": signal.run or block.run, "gate": signal.label or block.gate}
+        (clock, value, label), block = self.signals[n], self.block
+        names = {"run": clock.run or value.run or block.run, "gate": label or block.gate}
         for role, at in self.places.items():
             text = row.cell(at)
             if role in self.above:  # of merged cells only the first has a text

@@ -204,9 +204,10 @@ class Table:
         """Split a line into cells; numbers get a decimal point, and what is missing is empty."""
         if not self.separator:
             values = dict(_named_values(line))
-            several = {(name, 0) for name, count in values.keys() - self._names if count}
-            is_row = values and several.isdisjoint(self._names)
-            return [values.get(name, "") for name in self._names] if is_row else [line]
+            # Names that come again are of another row, which may not be lost.
+            again = [(name, n) for name, n in values if n and (name, 0) in self._names]
+            names = dict.fromkeys([*self._names, *again])
+            return [values.get(name, "") for name in names] if values else [line]
         cells = split_cells(line, self.separator, len(self._usual))
         missing, has_comma = vocabulary.words()["missing"], form("decimal comma").fullmatch
         cells = ["" if text[:5].casefold() in missing else text for text in cells]
@@ -231,6 +232,8 @@ class Table:
                 block.headings += [] if row.is_mark else [row]
             elif mark:
                 self.remarks += [row] if number <= _SAMPLE else []
+            elif not self.separator and len(row.texts) > len(self._names):
+                self.strays.append(row)
             elif self._is_row(row):
                 if not block.width:
                     block.begin(len(row.texts))
@@ -238,11 +241,7 @@ class Table:
             elif any(row.texts):
                 if len(block.headings) > _SAMPLE:
                     return
-                # What has a value as rows have it, and half as many as they, is no heading.
-                names = [name for name, _ in _named_values(line)] if self._names else []
-                is_like = any(name in self._names for name in names if name[0])
-                is_broken = is_like and 2 * len(names) > len(self._names)
-                (self.strays if block.width or is_broken else block.headings).append(row)
+                (self.strays if block.width else block.headings).append(row)
 
     def _next_block(self, last: RowBlock, mark: str) -> RowBlock:
         """Return the block below a mark; a run or gate goes on until a mark names another."""

@@ -94,11 +94,6 @@ class TimerFile:
         self.problems = ProblemList(str(self.path), make_reason("timer_files").text)
 
     @property
-    def has_unit(self) -> bool:
-        """Whether it says the unit of its times."""
-        return None not in self.powers
-
-    @property
     def is_stacked(self) -> bool:
         """Whether runs may stand one below the other; they part where times begin anew."""
         return not (self.is_sampled or self.has_runs)

@@ -111,8 +111,8 @@ def is_number(text: str) -> bool:
 
 
 def is_measured(text: str) -> bool:
-    """Whether a text is a number or a time of day, as no heading is."""
-    return is_number(text) or (":" in text and form("clock").fullmatch(text[:LONGEST]) is not None)
+    """Whether a text is a number, a time with its unit or one of day, as no heading is."""
+    return is_number(text) or form("stamp").fullmatch(text[:LONGEST]) is not None
 
 
 @lru_cache(10_000)
