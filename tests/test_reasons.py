@@ -18,7 +18,7 @@ from rig.wordings import WORDINGS
 RIG = Path(__file__).parents[1] / "rig"
 RAISERS = {"make_reason": 0, "rig_error": 0, "plain_reason": 1, "problem": 1,
            "CheckFailedError": 0, "NotPossibleError": 0, "problems.add": 3, "_problems.add": 3,
-           "place.add": 1, "problems.refuse": 2, "refusal": 1}  # fmt: skip
+           "place.add": 1, "problems.refuse": 1, "refusal": 1}  # fmt: skip
 """Functions that take a code, and which of their arguments it is."""
 REFUSED = {f"refused_{reason.name.lower()}" for reason in RefusalReason}
 SQLITE = {name.lower() for name in dir(sqlite3) if name.startswith("SQLITE_")}

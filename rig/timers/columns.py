@@ -115,7 +115,7 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     """
     width = max(len(row.texts) for row in rows)
     if width > _WIDEST:
-        file.problems.refuse(rows[0].line, 1, "too_many_columns", columns=width, limit=_WIDEST)
+        file.problems.refuse(rows[0].line, "too_many_columns", columns=width, limit=_WIDEST)
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
     facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
     heading = block.find_heading(width, facts)
@@ -130,7 +130,7 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     if heading is None:
         for row in block.headings:
             if row.count_known() > 1 and len(row.texts) > width:
-                file.problems.refuse(row.line, 1, "heading_unfit", columns=width)
+                file.problems.refuse(row.line, "heading_unfit", columns=width)
         inputs = [column for column in columns if column.role in SAMPLED]
         for column, name in zip(inputs, block.find_inputs(len(inputs)), strict=False):
             column.gate = column.name = name
@@ -138,13 +138,13 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     above = heading or rows[0]
     for column in columns:
         if column.role == "setting":
-            accepted = "a heading that is understood: call it gate, run or state, or leave it out"
+            accepted = roles()["setting"][1]
             file.problems.reject(*above.place(column.at), "heading", column.name, accepted)
     file.problems.raise_if_any()
     if {column.role for column in columns}.isdisjoint({"time", *SAMPLED}):
         durations = ", ".join(repr(column.name) for column in columns if column.role == "duration")
         code = "durations" if durations else "no_time_column"
-        file.problems.refuse(above.line, 1, code, numbers=durations)
+        file.problems.refuse(above.line, code, numbers=durations)
     return columns
 
 

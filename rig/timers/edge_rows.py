@@ -75,7 +75,7 @@ def read_edges(path: str | Path) -> list[Drop]:
         edges.append((tick, channel, bool(state)))
     problems.raise_if_any()
     if not any(runs.values()):
-        problems.refuse(1, 1, "no_edges")
+        problems.refuse(1, "no_edges")
     return [make_drop(run, runs[run]) for run in sorted(runs)]
 
 

@@ -203,13 +203,13 @@ def _refuse_impossible(reading: FileReading, place: str) -> None:
     earlier: dict[object, int] = {}
     for n, drop in enumerate(drops):
         lines = tuple(reading.line[reading.part(n)].tolist())
-        if layout.pause_s and (other := earlier.setdefault(lines, drop.run)) != drop.run:
-            raise refusal(place, "same_twice", run=drop.run, other=other)  # another clock's
         # Of coarse times those of a whole drop are a copy's; of fine ones, rows may be missing.
         is_coarse = all(edge.tick % _COARSE == 0 for edge in drop.edges)
         moments: set[object] = {drop.edges} if is_coarse else {*drop.edges}
+        if layout.pause_s and lines in earlier:  # a column of another clock
+            moments = {lines}
         same = Counter(earlier[moment] for moment in moments & earlier.keys())
-        earlier |= dict.fromkeys(moments, drop.run)
+        earlier |= dict.fromkeys((lines, *moments), drop.run)
         for run, count in same.most_common(1):
             if count >= min(len(moments), max(_FEWEST_SAME, 1 + len(moments) // 2)):
                 raise refusal(place, "same_twice", run=drop.run, other=run)

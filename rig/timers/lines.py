@@ -42,7 +42,7 @@ def read_lines(path: str | Path) -> Generator[str]:
         require_file(path)
         size = Path(path).stat().st_size
         if size > MAX_BYTES:
-            problems.refuse(1, 1, "too_large", size_mb=size / 1e6, limit_mb=MAX_BYTES / 1e6)
+            problems.refuse(1, "too_large", size_mb=size / 1e6, limit_mb=MAX_BYTES / 1e6)
         with Path(path).open("rb") as file:
             start = file.read(_START)
         zeros = [start[n::2].count(0) * 3 > len(start) for n in (0, 1)]
@@ -52,12 +52,12 @@ def read_lines(path: str | Path) -> Generator[str]:
         elif sum(zeros) == 1:
             encoding = "utf-16-be" if zeros[0] else "utf-16-le"
         elif b"\0" in start:
-            problems.refuse(1, 1, "not_text")
+            problems.refuse(1, "not_text")
         with Path(path).open(encoding=encoding, errors="windows") as stream:
             read_line = partial(stream.readline, LONGEST_LINE)
             for number, line in enumerate(iter(read_line, ""), 1):
                 if len(line) == LONGEST_LINE:
-                    problems.refuse(number, 1, "not_text")
+                    problems.refuse(number, "not_text")
                 yield line.rstrip("\n")
     except OSError as error:
         raise refusal(str(path), "unreadable", text=error.strerror or str(error)) from error

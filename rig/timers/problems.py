@@ -46,9 +46,9 @@ class ProblemList:
         """Note a value that is not what is accepted there."""
         self.add(line, column, key, "not_accepted", text=text, accepted=accepted)
 
-    def refuse(self, line: int, column: int, code: str, /, **values: object) -> NoReturn:
-        """Raise a fault for which the rest of the file is not read, with those before it."""
-        self.add(line, column, "", code, **values)
+    def refuse(self, line: int, code: str, /, **values: object) -> NoReturn:
+        """Raise a fault of a line for which the rest is not read, with those before it."""
+        self.add(line, 1, "", code, **values)
         self.raise_if_any()
         raise AssertionError
 

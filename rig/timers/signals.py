@@ -69,7 +69,7 @@ def read_file(file: TimerFile) -> TimerFile:
     file.unread += [row.line for row in table.strays]
     if not len(file.changes):
         notes = "".join(f"; {note}" for note in file.notes)
-        file.problems.refuse(1, 1, "nothing_passes" if file.rows else "no_edges", notes=notes)
+        file.problems.refuse(1, "nothing_passes" if file.rows else "no_edges", notes=notes)
     file.notes += [make_reason("last_line_cut")] if is_cut(file.path) else []
     return file
 
@@ -98,7 +98,7 @@ class SignalReader:
         self.clocks = list(dict.fromkeys(signal.clock for signal in self.signals))
         base = (0.0, 1.0) if self.clocks[0].role == "time" else block.find_time_base()
         if base is None:
-            file.problems.refuse(sample[0].line, 1, "no_rate", lacks="a column of times or a rate")
+            file.problems.refuse(sample[0].line, "no_rate", lacks="a column of times or a rate")
         self.base, self.latest = base, dict[int, int]()
         used = {column.role for column in columns}
         filled = {x.at: sum(row.cell(x.at) != "" for row in sample) for x in columns}
@@ -142,13 +142,13 @@ class SignalReader:
                 file.unread += [] if is_read else [row.line]
             self.count += 1
             if len(self.changes) > MAX_EVENTS:
-                file.problems.refuse(row.line, 1, "too_many_events", limit=MAX_EVENTS)
+                file.problems.refuse(row.line, "too_many_events", limit=MAX_EVENTS)
         file.rows += self.count
         if self.unused and not self.places and self.signals[0].value.role == "moment":
             steps = [b[1] - a[1] for a, b in itertools.pairwise(self.changes)]
             if len(steps) > 3 and max(steps) < 1.5 * min(steps):
                 line = self.changes[0][0]
-                file.problems.refuse(line, 1, "regular_samples", columns=self.unused)
+                file.problems.refuse(line, "regular_samples", columns=self.unused)
         for n, signal in enumerate(self.signals):
             if signal.value.role == "volts":
                 self._find_crossings(n, row)
@@ -163,8 +163,8 @@ class SignalReader:
 
         Rows of samples without times are at a stated rate.
         """
-        text, is_counted = row.cell(clock.at), clock.at < 0
-        tick = self.count * TICK_HZ if is_counted else moment(text, clock.power or 0)
+        text = row.cell(clock.at)
+        tick = self.count * TICK_HZ if clock.at < 0 else moment(text, clock.power or 0)
         if tick is None:
             if text:
                 self._reject(row, clock, text)

@@ -45,7 +45,7 @@ def read_video(path: str | Path) -> VideoTrack:
     above = rows[0].block.headings if rows else []
     heading = next((row for row in above[::-1] if len(_find_axes(row)) == len(_SCALES)), None)
     if heading is None:
-        problems.refuse(1, 1, "no_track")
+        problems.refuse(1, "no_track")
     axes = sorted(_find_axes(heading).items())
     for name, (n, unit) in axes:
         if unit not in _SCALES[name]:
@@ -63,7 +63,7 @@ def read_video(path: str | Path) -> VideoTrack:
     )
     times, x, y = places[:, ~np.isnan(places).any(axis=0)]
     if times.size < FEWEST or not np.all(np.diff(times) > 0):
-        problems.refuse(1, 1, "few_frames", frames=times.size, needed=FEWEST)
+        problems.refuse(1, "few_frames", frames=times.size, needed=FEWEST)
     return VideoTrack(times, x, y, len(rows) + len(table.strays) - len(track))
 
 
