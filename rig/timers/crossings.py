@@ -14,6 +14,8 @@ _HYSTERESIS = 0.2
 """Share of the swing between dark and bright, half of it on either side of the middle."""
 _CLEAR_SWING = 8.0
 """Swing over the noise of each level below which there is no passage to be seen."""
+_ROUNDS = 10
+"""In which two means, one for each level, are found: of two levels, two or three are enough."""
 _SCATTER = 1.4826
 """Standard deviation over the median of absolute deviations, of normal noise."""
 
@@ -44,14 +46,11 @@ def find_crossings(samples: Array, threshold: tuple[float, float]) -> Array:
 def find_threshold(volts: Array) -> tuple[float, float] | None:
     """Return the middle between two levels, and half the hysteresis; `None` without two levels."""
     low, high = float(volts.min(initial=np.inf)), float(volts.max(initial=-np.inf))
-    for _ in range(50):  # two means, one for each level
+    for _ in range(_ROUNDS):
         above = volts > 0.5 * (low + high)
         if above.all() or not above.any():
             return None
-        before = low, high
         low, high = float(np.median(volts[~above])), float(np.median(volts[above]))
-        if before == (low, high):
-            break
     levels = (above, high), (~above, low)
     noise = max(float(np.median(np.abs(volts[side] - level))) for side, level in levels)
     if high - low < _CLEAR_SWING * _SCATTER * noise:
