@@ -128,9 +128,6 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     shared |= _held({"rated": block.find_time_base()})
     columns = [_read_column(block, heading, n, facts[n] | shared, cells[n]) for n in facts]
     if heading is None:
-        for row in block.headings:
-            if row.count_known() > 1 and len(row.texts) > width:
-                file.problems.refuse(row.line, "heading_unfit", columns=width)
         inputs = [column for column in columns if column.role in SAMPLED]
         for column, name in zip(inputs, block.find_inputs(len(inputs)), strict=False):
             column.gate = column.name = name
@@ -267,8 +264,8 @@ def pair_columns(columns: Sequence[TimerColumn]) -> list[Signal]:
     chosen = next((v for v in VALUES if any(c.role in v for c in columns)), ())
     is_sampled, pairs = chosen == SAMPLED, list[Signal]()
     for clock in times:
-        own = [column for column in columns if _clock_of(column, times) is clock]
-        values = [column for column in own if column.role in chosen]
+        valued = (column for column in columns if column.role in chosen)
+        values = [column for column in valued if _clock_of(column, times) is clock]
         if not chosen:
             values = [replace(clock, at=ROW_COUNT.at, role="moment")]
         labels = Counter(map(_label_of, values))

@@ -125,7 +125,8 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
     channels = reading.layout.channels
     inputs = [f"input {x} is the gate at channel {n}" for x, n in channels.items() if x]
     lines = [*reading.file.lines, *inputs, str(reading.layout), *filter(None, [match.text])]
-    return Import(reading.drops, channels, lines, notes)
+    drops = [reading.drop(n) for n in range(len(reading.runs))]
+    return Import(drops, channels, lines, notes)
 
 
 def _find_readings(options: Namespace, gates: Sequence[int], bars: int) -> list[FileReading]:
@@ -196,12 +197,13 @@ def _refuse_impossible(reading: FileReading, place: str) -> None:
 
     An input that has a name is no wire of all gates, unless the user stated so.
     """
-    file, layout, drops = reading.file, reading.layout, reading.drops
+    file, layout = reading.file, reading.layout
     is_wire = layout.groups == "passing" and not file.is_wide and bool(file.labels)
     if is_wire and "groups" not in file.stated:
         raise refusal(place, "one_wire", option=str(layout))
     earlier: dict[object, int] = {}
-    for n, drop in enumerate(drops):
+    for n in range(len(reading.runs)):
+        drop = reading.drop(n)
         lines = tuple(reading.line[reading.part(n)].tolist())
         # Of coarse times those of a whole drop are a copy's; of fine ones, rows may be missing.
         is_coarse = all(edge.tick % _COARSE == 0 for edge in drop.edges)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -141,11 +141,6 @@ class FileReading:
         self.channel, self.blocked = channel[order], blocked[order]
         runs, places = np.unique(np.sort(runs), return_index=True)
         self.runs, self.places = runs.tolist(), np.append(places, len(order))
-
-    @cached_property
-    def drops(self) -> list[Drop]:
-        """The drops, a run each."""
-        return [self.drop(n) for n in range(len(self.runs))]
 
     def part(self, n: int) -> slice:
         """Return where the edges of the n-th drop are."""

@@ -108,16 +108,13 @@ class RowBlock:
         stated, rows = dict[str, float](), [*self.remarks, *self.headings]
         for above, below in itertools.pairwise([*rows, *rows[-1:]]):
             for n, text in enumerate(above.texts):
-                mark = form("before a value").search(text := text[:60])
-                name, inside = (text[: mark.start()], text[mark.end() :]) if mark else (text, "")
-                role = next((x for x in ("rate", "start", "step") if x in roles_in(name)), "")
-                places = (x.strip().lower() for x in (inside, above.cell(n + 1), below.cell(n)))
-                quantities = filter(None, map(form("quantity").fullmatch, places if role else ()))
-                for number, unit in (quantity.groups() for quantity in quantities):
-                    power = _UNITS.get(vocabulary.unit_of(unit) or unit)
-                    if power is not None:
-                        value = float(number.replace(",", "."))
-                        stated.setdefault(role, value / 10.0**power)
+                for value in ("", above.cell(n + 1), below.cell(n)):
+                    setting = form("stated value").fullmatch(f"{text[:60]} {value[:60]}".strip())
+                    name, number, unit = setting.groups() if setting else ("", "", "")
+                    power = _UNITS.get(vocabulary.unit_of(unit.lower()) or unit.lower())
+                    role = next((x for x in ("rate", "start", "step") if x in roles_in(name)), "")
+                    if role and power is not None:
+                        stated.setdefault(role, float(number.replace(",", ".")) / 10.0**power)
         step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
         return (stated.get("start", 0.0), step) if step else None
 
