@@ -272,11 +272,12 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
     """
     saved, labels, stated = Path(options.map_file or ""), file.labels or [""], dict[str, Any]()
     texts = {options.map_file: next(read_lines(saved), "")} if saved.is_file() else {}
-    named = {"dark": options.dark, "unit": options.unit, "channel": options.channel}
-    called = {"channel": labels[0] or "input"}
+    names = {"dark": "dark", "unit": "unit", "channel": labels[0] or "input"}
     if options.channel is not None and len(labels) > 1:
         raise refusal("--channel", "inputs_several", inputs=", ".join(labels))
-    texts |= {f"--{x}": f"{called.get(x, x)}={y}" for x, y in named.items() if y is not None}
+    for option, name in names.items():
+        if (value := getattr(options, option)) is not None:
+            texts[f"--{option}"] = f"{name}={value}"
     texts |= {"--map": options.map} if options.map is not None else {}
     settings = {*SETTINGS}.difference(labels)
     for place, text in texts.items():

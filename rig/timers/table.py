@@ -24,15 +24,10 @@ TimeBase = tuple[float, float]
 """When the first sample was taken, and the time between two, s."""
 _Name = tuple[str, int]
 """Words before a value, and how many values with the same are before it in its line."""
-_COLUMN_ROLES = {
-    *("time", "elapsed", "state", "edge", "volts"),
-    *("gate", "run", "duration", "index", "derived"),
-}
 _UNFILLED = {"setting", "index", "derived"}
 """Roles of columns that may have a name and no values: a rate, comments, or distances."""
-_RATES = itertools.product({"": 0, "k": -3, "m": -6, "g": -9}.items(), ("hz", "sps", "s/s", "sa/s"))
-_UNITS = vocabulary.POWERS | {"": 0} | {prefix + unit: x for (prefix, x), unit in _RATES}
-"""Decimal power from seconds, or from hertz and samples in a second."""
+_UNITS = vocabulary.POWERS | {"": 0, "hz": 0, "khz": -3, "mhz": -6, "ghz": -9, "ks/s": -3}
+"""Decimal power from seconds, or from hertz."""
 _JUDGED = 100
 """Lines in which values are counted."""
 _SAMPLE = 500
@@ -142,7 +137,8 @@ class Row(NamedTuple):
     def count_known(self, columns: Collection[int] | None = None) -> int:
         """Count the cells, of some columns or of all, that say what a column is."""
         texts = [text for n, text in enumerate(self.texts) if columns is None or n in columns]
-        roles = [{*_COLUMN_ROLES & roles_in(x), vocabulary.unit_of(x)} - {""} for x in texts]
+        is_known = form("role of a column").fullmatch
+        roles = [{*filter(is_known, roles_in(x)), vocabulary.unit_of(x)} - {""} for x in texts]
         is_heading = set().union(*roles) - {"derived", "index"} and "units" not in roles_in(
             texts[0]
         )
