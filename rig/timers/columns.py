@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import NamedTuple
@@ -100,20 +100,21 @@ class Signal(NamedTuple):
     label: str
 
 
-def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[TimerColumn]:
+def columns_of(
+    file: TimerFile, block: RowBlock, rows: Sequence[Row], width: int
+) -> list[TimerColumn]:
     """Find out what the columns of a block are, in the way in which the file is read.
 
     Parameters
     ----------
-    rows
-        The first ones.
+    rows, width
+        The first ones, and how many cells they have at most.
 
     Raises
     ------
     InputError
         Columns of which none has times, or that are called as a setting is.
     """
-    width = max(len(row.texts) for row in rows)
     if width > _WIDEST:
         file.problems.refuse(rows[0].line, "too_many_columns", columns=width, limit=_WIDEST)
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
@@ -166,7 +167,7 @@ def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
         column.role = role
     for column in columns:
         column.role = meant.get(column.role, column.role)
-        file.powers |= {column.power} if column.role == "time" else set()
+    file.powers |= {column.power for column in columns if column.role == "time"}
 
 
 def _read_column(
@@ -254,7 +255,7 @@ def _held(facts: Mapping[str, object]) -> set[str]:
     return {fact for fact, holds in facts.items() if holds}
 
 
-def pair_columns(columns: Sequence[TimerColumn]) -> list[Signal]:
+def pair_columns(columns: Sequence[TimerColumn]) -> Iterator[Signal]:
     """Give each column of times what belongs to it: values of its run and input, and names."""
     counts = [column for column in columns if column.role == "index"][:1] or [ROW_COUNT]
     times = [column for column in columns if column.role == "time"]
@@ -262,19 +263,20 @@ def pair_columns(columns: Sequence[TimerColumn]) -> list[Signal]:
     finest = {_part_of(c): c.power for c in sorted(times, key=lambda c: c.power or 0)}
     times = [c for c in times if c.power == finest[_part_of(c)]] or counts
     chosen = next((v for v in VALUES if any(c.role in v for c in columns)), ())
-    is_sampled, pairs = chosen == SAMPLED, list[Signal]()
+    is_sampled = chosen == SAMPLED
+    clocks = {c: _clock_of(c, times) for c in columns if c.role in chosen}
+    parts = set(map(_part_of, clocks.values()))
     for clock in times:
-        valued = (column for column in columns if column.role in chosen)
-        values = [column for column in valued if _clock_of(column, times) is clock]
-        if not chosen:
+        values = [column for column in clocks if clocks[column] is clock]
+        # Without values it is another clock of the same, or tells of changes by itself.
+        if not (values or is_sampled or _part_of(clock) in parts):
             values = [replace(clock, at=ROW_COUNT.at, role="moment")]
         labels = Counter(map(_label_of, values))
         for n, value in enumerate(values, 1):
             is_beside = is_sampled or len(values) > 1
             label = _label_of(value) if is_beside else clock.gate or value.gate
             label += f" ({n})" if is_sampled and labels[label] > 1 else ""
-            pairs.append(Signal(clock, value, label))
-    return pairs
+            yield Signal(clock, value, label)
 
 
 def _part_of(clock: TimerColumn) -> tuple[str, str, str]:

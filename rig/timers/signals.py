@@ -52,7 +52,7 @@ def read_file(file: TimerFile) -> TimerFile:
         numbered = enumerate(itertools.chain(head, lines), 1)
         is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
         table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered)
-        file.lines.append(f"a table, its cells separated by {_MARKS[table.separator]}")
+        file.lines += [f"a table, its cells separated by {_MARKS[table.separator]}"]
         readers: dict[object, SignalReader] = {}
         changes = [file.changes]
         for block, group in itertools.groupby(table.rows(), attrgetter("block")):
@@ -92,9 +92,9 @@ class SignalReader:
     """
 
     def __init__(self, file: TimerFile, block: RowBlock, sample: list[Row]) -> None:
-        columns = columns_of(file, block, sample)
-        self.file, self.signals = file, pair_columns(columns)
-        self.width = max(len(row.texts) for row in sample)
+        self.file, self.width = file, max(len(row.texts) for row in sample)
+        columns = columns_of(file, block, sample, self.width)
+        self.signals = [*pair_columns(columns)]
         self.clocks = list(dict.fromkeys(signal.clock for signal in self.signals))
         base = (0.0, 1.0) if self.clocks[0].role == "time" else block.find_time_base()
         if base is None:
