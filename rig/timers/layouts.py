@@ -105,8 +105,7 @@ class FileReading:
         self.file, self.layout = file, layout
         is_guess = file.is_guess or file.ways > 1 or layout.groups == "passing"
         self.least_share = _GOOD_GUESS if is_guess else _GOOD
-        parts = group_changes(file, layout.unit, layout.groups, layout.pause_s)
-        changes, drop, numbers = parts
+        changes, drop, numbers = group_changes(file, layout.unit, layout.groups, layout.pause_s)
         label, channels = changes["label"], [layout.channels.get(name, -1) for name in file.names]
         if layout.groups == "passing":  # of gates that are passed one by one, each has as many
             channels = [*layout.channels.values()]

@@ -54,7 +54,7 @@ def read_file(file: TimerFile) -> TimerFile:
         table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered)
         file.lines += [f"a table, its cells separated by {_MARKS[table.separator]}"]
         readers: dict[object, SignalReader] = {}
-        changes = [file.changes]
+        changes = [np.empty(0, CHANGE)]
         for block, group in itertools.groupby(table.rows(), attrgetter("block")):
             rows = iter(group)
             sample = list(itertools.islice(rows, _SAMPLE))

@@ -181,7 +181,7 @@ class Table:
 
     def __init__(self, lines: Iterable[tuple[int, str]]) -> None:
         self.remarks, self.strays = list[Row](), list[Row]()
-        unwrapped = (pair for number, line in lines for pair in _unwrap(number, line))
+        unwrapped = ((number, piece) for number, line in lines for piece in _unwrap(line))
         sample = list(itertools.islice(unwrapped, _SAMPLE))
         self._lines = itertools.chain(sample, unwrapped)
         plain = [line for _, line in sample if line.strip() and not vocabulary.is_remark(line)]
@@ -189,7 +189,6 @@ class Table:
         self.separator = find_separator(plain, named)
         self._usual: tuple[tuple[bool, bool], ...] = ()
         shapes = Counter(x for x in (_shape(self.split(y)) for y in plain) if any(map(all, x)))
-        self._fewest = 1 + (2 * sum(n for x, n in shapes.items() if len(x) > 1) > shapes.total())
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
 
@@ -255,7 +254,8 @@ class Table:
         if _shape(row.texts) == self._usual:  # as most
             return True
         # Above rows of several cells may stand a date, or a count.
-        is_data = len(row.texts) >= self._fewest and any(map(is_measured, row.texts))
+        is_wide = len(row.texts) > 1 or len(self._usual) < 2
+        is_data = is_wide and any(map(is_measured, row.texts))
         if is_data and all(map(kinds_of, filter(None, row.texts))):
             return True
         # One of data with a fault: some of it is a number, as in those above, or below their names.
@@ -282,13 +282,13 @@ def split_cells(line: str, separator: str, usual: int = 0) -> list[str]:
     return [text.strip() for text in line.split(separator)]
 
 
-def _unwrap(number: int, line: str) -> list[tuple[int, str]]:
+def _unwrap(line: str) -> list[str]:
     """Return a line without the brackets around it; lists in a line are lines of their own."""
     line = form("exponent of Fortran").sub("E", line) if "D" in line else line
     if line[:1].isdigit() or not form("list").match(line):
-        return [(number, line)]
+        return [line]
     pieces = form("between lists").split(line)
-    return [(number, form("list").sub("", piece, 1).rstrip("])}, ;")) for piece in pieces]
+    return [form("list").sub("", piece, 1).rstrip("])}, ;") for piece in pieces]
 
 
 def _named_values(line: str) -> list[tuple[_Name, str]]:

@@ -76,7 +76,7 @@ class TimerFile:
     ways: int = 1
     lines: list[str] = field(default_factory=list)
     names: dict[str, int] = field(default_factory=lambda: {"": 0})
-    changes: Changes = field(default_factory=lambda: np.empty(0, CHANGE))
+    changes: Changes = field(init=False)
     period: int | None = None
     powers: set[int | None] = field(default_factory=set)
     is_sampled: bool = False
