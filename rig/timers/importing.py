@@ -182,7 +182,7 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
         proposed = list(dict.fromkeys(str(x.layout) for x in [*likely, *is_open]))[:3]
         options = "; ".join([*proposed, "--as-read"])
         values = {"share": 100 * match.share, "run": best.runs[match.worst], "options": options}
-        line = best.line[best.part(match.worst)].min()
+        line = best.line[best.parts[match.worst]].min()
         raise refusal(f"{place}:{line}:1", "no_reading_fits", **values)
     (match, reading), *rest = ranked
     rivals = [row for row in rest if row[1].layout.first == reading.layout.first]
@@ -204,7 +204,7 @@ def _refuse_impossible(reading: FileReading, place: str) -> None:
     earlier: dict[object, int] = {}
     for n in range(len(reading.runs)):
         drop = reading.drop(n)
-        lines = tuple(reading.line[reading.part(n)].tolist())
+        lines = tuple(reading.line[reading.parts[n]].tolist())
         # Of coarse times those of a whole drop are a copy's; of fine ones, rows may be missing.
         is_coarse = all(edge.tick % _COARSE == 0 for edge in drop.edges)
         moments: set[object] = {drop.edges} if is_coarse else {*drop.edges}
@@ -224,7 +224,7 @@ def _refuse_impossible(reading: FileReading, place: str) -> None:
 
 def _account(reading: FileReading, options: Namespace) -> Reason:
     """Say what became of every row; refuse rows that are not used."""
-    file, used = reading.file, {*reading.line.tolist()}
+    file, used = reading.file, set(reading.line)
     # A level that changes may be of an input that is no gate.
     changed = file.changes["line"][~file.changes["first"]]
     left = set() if file.is_sampled else ({*changed.tolist()} - used) | reading.dropped

@@ -91,6 +91,8 @@ class FileReading:
         Their numbers, in order.
     places
         Where the edges of each run begin, and where those of the last end.
+    parts
+        The edges of each run.
     firsts
         Inputs whose first row is a beam that is blocked, at the beginning or by a change.
     dropped
@@ -105,7 +107,7 @@ class FileReading:
         self.file, self.layout = file, layout
         is_guess = file.is_guess or file.ways > 1 or layout.groups == "passing"
         self.least_share = _GOOD_GUESS if is_guess else _GOOD
-        changes, drop, numbers = group_changes(file, layout.unit, layout.groups, layout.pause_s)
+        changes, drop = group_changes(file, layout.unit, layout.groups, layout.pause_s)
         label, channels = changes["label"], [layout.channels.get(name, -1) for name in file.names]
         if layout.groups == "passing":  # of gates that are passed one by one, each has as many
             channels = [*layout.channels.values()]
@@ -127,11 +129,15 @@ class FileReading:
         is_change = ~changes["first"] | (blocked & (is_late | (layout.first == "change")))
         is_edge = is_change & (channel >= 0)
         self.dropped = {*changes["line"][is_change & ~is_edge].tolist()}
-        drops, first, places = np.unique(drop[is_edge], return_index=True, return_inverse=True)
-        runs = numbers[drops]
+        _, first, places = np.unique(drop[is_edge], return_index=True, return_inverse=True)
+        name = changes["run"][is_edge][first]
+        numbers = [-1 if (n := number_of(x)) is None else n for x in file.names]
+        runs = np.array(numbers)[name]
+        runs += np.any(runs == 0)  # a file may count its runs from 0
+        runs[(runs < 0) | (count_before(runs) > 0)] = 0
         free = np.setdiff1d(np.arange(1, 1 + 2 * len(runs)), runs)
         runs[runs == 0] = free[: np.sum(runs == 0)]
-        names = np.array([*file.names])[changes["run"][is_edge][first]].tolist()
+        names = np.array([*file.names])[name].tolist()
         called = zip(names, runs.tolist(), strict=True) if any(names) else ()
         self.renamed = {x or "one without a name": n for x, n in called if number_of(x) != n}
         runs = runs[places]
@@ -140,14 +146,11 @@ class FileReading:
         self.channel, self.blocked = channel[order], blocked[order]
         runs, places = np.unique(np.sort(runs), return_index=True)
         self.runs, self.places = runs.tolist(), np.append(places, len(order))
-
-    def part(self, n: int) -> slice:
-        """Return where the edges of the n-th drop are."""
-        return slice(*self.places[n : n + 2])
+        self.parts = [*map(slice, self.places, self.places[1:])]
 
     def drop(self, n: int) -> Drop:
         """Return the n-th drop."""
-        columns = (x[self.part(n)].tolist() for x in (self.tick, self.channel, self.blocked))
+        columns = (x[self.parts[n]].tolist() for x in (self.tick, self.channel, self.blocked))
         return make_drop(self.runs[n], zip(*columns, strict=True))
 
     @property
@@ -175,10 +178,8 @@ class FileReading:
 
 
 @lru_cache(4)
-def group_changes(
-    file: TimerFile, unit: str, groups: str, pause: float
-) -> tuple[Changes, Index, Index]:
-    """Return changes by drops and times, which drop each is of, and what numbers drops have, or 0.
+def group_changes(file: TimerFile, unit: str, groups: str, pause: float) -> tuple[Changes, Index]:
+    """Return changes by drops and times, and which drop each is of.
 
     In a file that says the drops, they are parted by no time; in others where times begin anew.
     """
@@ -199,12 +200,7 @@ def group_changes(
     if pause:
         is_late = np.diff(changes["tick"], prepend=0) >= round(pause * TICK_HZ)
         drops += np.cumsum(is_late & (np.diff(drops, prepend=-1) == 0))
-    _, starts = np.unique(drops, return_index=True)
-    named = np.array([-1 if (n := number_of(x)) is None else n for x in file.names])
-    numbers = named[changes["run"][starts]]
-    numbers += np.any(numbers == 0)  # a file may count its runs from 0
-    is_first = count_before(numbers) == 0
-    return changes, drops, np.where(is_first, np.maximum(numbers, 0), 0)
+    return changes, drops
 
 
 def count_before(keys: Index) -> Index:
@@ -234,7 +230,7 @@ def find_layouts(file: TimerFile, gates: Sequence[int], bars: int) -> Iterator[F
     state, is_wire = file.changes["state"], len(file.labels) < 2 and bars == 1 < len(gates)
     groups = ["runs", *["unsorted"] * file.is_stacked, *["columns"] * file.is_wide]
     groups += ["passing"] * is_wire
-    changes, drop, _ = group_changes(file, "", groups[0], 0.0)
+    changes, drop = group_changes(file, "", "runs", 0.0)
     most = 1 + count_before(drop * len(file.names) + changes["label"]).max(initial=0)
     is_signal = np.any(state > STATES.index("blocked"))
     levels = ["high", "low"] if is_signal else ["states", "inverted"]
@@ -261,7 +257,7 @@ def _pauses(file: TimerFile, unit: str, groups: str) -> list[float]:
     Between drops nothing passes for far longer than within one: of the pauses in order, the first
     of half a second or more that is three times as long as the one before.
     """
-    changes, drop, _ = group_changes(file, unit, groups, 0.0)
+    changes, drop = group_changes(file, unit, groups, 0.0)
     is_same = (np.diff(drop) == 0) & (not file.has_runs)
     pauses = np.sort(np.diff(changes["tick"])[is_same])
     is_clear = pauses[1:] >= np.maximum(_CLEAR_PAUSE * pauses[:-1], TICK_HZ / 2)
@@ -281,7 +277,7 @@ def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list
     by_number = {x: n for x in labels if (n := number_of(x)) is not None and n in gates}
     if len(set(by_number.values())) == len(labels):
         return [by_number]
-    _, drop, _ = group_changes(file, layout.unit, layout.groups, 0.0)
+    _, drop = group_changes(file, layout.unit, layout.groups, 0.0)
     if labels == [""] and len(gates) > 1 and np.all(np.bincount(drop) < _FEWEST):
         return []
     later = file.changes[~file.changes["first"]][::-1]

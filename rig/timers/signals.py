@@ -152,8 +152,7 @@ class SignalReader:
         for n, signal in enumerate(self.signals):
             if signal.value.role == "volts":
                 self._find_crossings(n, row)
-        silent = self.count - len({change[0] for change in self.changes})
-        if self.is_sampled and 2 * silent > self.count:
+        if self.is_sampled and 2 * len({change[0] for change in self.changes}) < self.count:
             lasting = [self.latest[at] - start for at, start in self.starts.items()]
             file.period = max(lasting, default=0) // max(1, self.count - 1)
         return np.array(self.changes, CHANGE)

@@ -185,7 +185,7 @@ class Table:
         sample = list(itertools.islice(unwrapped, _SAMPLE))
         self._lines = itertools.chain(sample, unwrapped)
         plain = [line for _, line in sample if line.strip() and not vocabulary.is_remark(line)]
-        self._names, named = _find_names(plain[-_JUDGED:])
+        self._names, named = _find_names(plain)
         self.separator = find_separator(plain, named)
         self._usual: tuple[tuple[bool, bool], ...] = ()
         shapes = Counter(x for x in (_shape(self.split(y)) for y in plain) if any(map(all, x)))
@@ -305,7 +305,7 @@ def _named_values(line: str) -> list[tuple[_Name, str]]:
 
 def _find_names(lines: Sequence[str]) -> tuple[list[_Name], int]:
     """Return what most lines name before their values, and how many values they name so."""
-    rows = [tuple(name for name, _ in _named_values(line)) for line in lines]
+    rows = [tuple(name for name, _ in _named_values(line)) for line in lines[-_JUDGED:]]
     usual, count = Counter(filter(None, rows)).most_common(1)[0] if any(rows) else ((), 0)
     is_named = any(name[1:] for name, _ in usual) and 2 * count > sum(map(bool, rows))
     return ([*usual], count * len(usual)) if is_named else ([], 0)
