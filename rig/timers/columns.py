@@ -18,16 +18,7 @@ from rig.text_rows import read_rows
 from rig.timers import vocabulary
 from rig.timers.table import Row, RowBlock
 from rig.timers.timer_file import TimerFile
-from rig.timers.vocabulary import (
-    POWERS,
-    SYMBOLS,
-    find_label,
-    form,
-    is_number,
-    normal,
-    unit_of,
-    words,
-)
+from rig.timers.vocabulary import POWERS, find_label, form, is_number, normal, unit_of, words
 
 SAMPLED = ("level", "volts")
 """Roles of samples: what an input was at a time, whether it changed then or not."""
@@ -83,7 +74,7 @@ class TimerColumn:
     def meaning(self) -> str:
         """What it was taken for, in words."""
         meaning = " or ".join(roles()[role][0] for role in self.role.split("|"))
-        meaning += f" in {SYMBOLS.get(self.power, 'an unknown unit')}" * (self.role == "time")
+        meaning += f" in {vocabulary.SYMBOLS[self.power]}" * (self.role == "time")
         return meaning + "".join(f": {word!r} is high" for word in [*self.words][:1])
 
 

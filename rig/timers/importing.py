@@ -198,7 +198,7 @@ def _refuse_impossible(reading: FileReading, place: str) -> None:
     An input that has a name is no wire of all gates, unless the user stated so.
     """
     file, layout = reading.file, reading.layout
-    is_wire = layout.groups == "passing" and not file.is_wide and bool(file.labels)
+    is_wire = layout.groups == "passing" and "wide" not in file.facts and bool(file.labels)
     if is_wire and "groups" not in file.stated:
         raise refusal(place, "one_wire", option=str(layout))
     earlier: dict[object, int] = {}
@@ -227,7 +227,7 @@ def _account(reading: FileReading, options: Namespace) -> Reason:
     file, used = reading.file, set(reading.line)
     # A level that changes may be of an input that is no gate.
     changed = file.changes["line"][~file.changes["first"]]
-    left = set() if file.is_sampled else ({*changed.tolist()} - used) | reading.dropped
+    left = set() if "sampled" in file.facts else ({*changed.tolist()} - used) | reading.dropped
     unused = sorted({*file.unread, *left})
     counts = {"runs": len(reading.runs), "rows": file.rows, "edges": len(reading.line)}
     if not unused:

@@ -105,7 +105,7 @@ class FileReading:
 
     def __init__(self, file: TimerFile, layout: FileLayout) -> None:
         self.file, self.layout = file, layout
-        is_guess = file.is_guess or file.ways > 1 or layout.groups == "passing"
+        is_guess = "guess" in file.facts or layout.groups == "passing"
         self.least_share = _GOOD_GUESS if is_guess else _GOOD
         changes, drop = group_changes(file, layout.unit, layout.groups, layout.pause_s)
         label, channels = changes["label"], [layout.channels.get(name, -1) for name in file.names]
@@ -185,7 +185,7 @@ def group_changes(file: TimerFile, unit: str, groups: str, pause: float) -> tupl
     """
     changes, rank = file.changes, file.changes["rank"]
     part = changes[{"rows": "line", "columns": "clock"}.get(groups, "run")]
-    keys = np.stack([changes["block"] * (not file.has_runs), changes["run"], part])
+    keys = np.stack([changes["block"] * ("run" not in file.facts), changes["run"], part])
     order = np.lexsort((rank, changes["line"], *keys[::-1]))
     is_new = np.any(np.diff(keys[:, order], prepend=-1) != 0, axis=0)
     if file.is_stacked and groups in {"runs", "passing"}:
@@ -228,7 +228,7 @@ def find_layouts(file: TimerFile, gates: Sequence[int], bars: int) -> Iterator[F
     """
     stated = file.stated
     state, is_wire = file.changes["state"], len(file.labels) < 2 and bars == 1 < len(gates)
-    groups = ["runs", *["unsorted"] * file.is_stacked, *["columns"] * file.is_wide]
+    groups = ["runs", *["unsorted"] * file.is_stacked, *["columns"] * ("wide" in file.facts)]
     groups += ["passing"] * is_wire
     changes, drop = group_changes(file, "", "runs", 0.0)
     most = 1 + count_before(drop * len(file.names) + changes["label"]).max(initial=0)
@@ -258,7 +258,7 @@ def _pauses(file: TimerFile, unit: str, groups: str) -> list[float]:
     of half a second or more that is three times as long as the one before.
     """
     changes, drop = group_changes(file, unit, groups, 0.0)
-    is_same = (np.diff(drop) == 0) & (not file.has_runs)
+    is_same = (np.diff(drop) == 0) & ("run" not in file.facts)
     pauses = np.sort(np.diff(changes["tick"])[is_same])
     is_clear = pauses[1:] >= np.maximum(_CLEAR_PAUSE * pauses[:-1], TICK_HZ / 2)
     choices = [0.0, *(pauses[1:][is_clear] / TICK_HZ).tolist()[:1]]

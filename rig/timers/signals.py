@@ -116,12 +116,12 @@ class SignalReader:
         self.unused = ", ".join(unused)
         file.notes += [make_reason("columns_unused", columns=self.unused)] if self.unused else []
         file.lines += [f"  {column.name}: {column.meaning}" for column in columns]
-        file.is_sampled |= self.is_sampled
         is_named = any(clock.run for clock in self.clocks)
         called = {re.sub("[0-9]+", "", clock.name) for clock in self.clocks}
-        file.is_wide |= len(self.clocks) > len(called) == 1 and not (self.is_sampled or is_named)
-        file.is_guess |= bool(self.above)
-        file.has_runs |= "run" in self.places
+        is_wide = len(self.clocks) > len(called) == 1 and not (self.is_sampled or is_named)
+        is_guess = bool(self.above) or file.ways > 1
+        file.facts |= {*self.places, *["sampled"] * self.is_sampled}
+        file.facts |= {*["wide"] * is_wide, *["guess"] * is_guess}
 
     def read(self, block: RowBlock, rows: Iterator[Row]) -> Changes:
         """Return the changes that rows say; a row may say that nothing changes, or be unread."""

@@ -51,14 +51,11 @@ class TimerFile:
     powers
         Of its times, from seconds; `None` where it does not say the unit of some, which are kept as
         if they were seconds.
-    is_sampled
-        Whether it has samples: a level that changes may be of an input that is no gate.
-    is_wide
-        Whether a row has several times that are called alike, so that each may be of a run.
-    is_guess
-        Whether rows lack the name of their run or gate, so that falls decide.
-    has_runs
-        Whether rows say their run, which may go on in another block.
+    facts
+        What holds of it: ``sampled``, it has samples, and a level that changes may be of an input
+        that is no gate; ``wide``, a row has several times that are called alike, so that each may
+        be of a run; ``guess``, rows lack the name of their run or gate, so that falls decide;
+        ``run`` and ``gate``, rows say them, and a run may go on in another block.
     rows
         How many lines of data there are.
     unread
@@ -79,10 +76,7 @@ class TimerFile:
     changes: Changes = field(init=False)
     period: int | None = None
     powers: set[int | None] = field(default_factory=set)
-    is_sampled: bool = False
-    is_wide: bool = False
-    is_guess: bool = False
-    has_runs: bool = False
+    facts: set[str] = field(default_factory=set)
     rows: int = 0
     unread: list[int] = field(default_factory=list)
     notes: list[Reason] = field(default_factory=list)
@@ -96,7 +90,7 @@ class TimerFile:
     @property
     def is_stacked(self) -> bool:
         """Whether runs may stand one below the other; they part where times begin anew."""
-        return not (self.is_sampled or self.has_runs)
+        return self.facts.isdisjoint({"sampled", "run"})
 
     @property
     def labels(self) -> list[str]:

@@ -11,7 +11,7 @@ from rig.text_rows import read_rows
 
 POWERS = {"s": 0, "ms": 3, "us": 6, "ns": 9}
 """Decimal power from seconds, by the unit's name."""
-SYMBOLS: dict[int | None, str] = {0: "s", 3: "ms", 6: "µs", 9: "ns"}
+SYMBOLS = {0: "s", 3: "ms", 6: "µs", 9: "ns", None: "an unknown unit"}
 LONGEST = 200
 """Characters: no cell, and no line of named values, is longer."""
 
