@@ -152,9 +152,9 @@ def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
     Of roles that are possible each is taken once; falls decide which way is that of the file.
     """
     there = {column.role for column in columns}
-    meant = {"elapsed": "duration" if "time" in there else "time"}
     # Levels beside states are the same without a name; beside volts, volts that are 0 at first.
-    meant["level"] = next((role for role in ("volts", "state") if role in there), "level")
+    level = next((role for role in ("volts", "state") if role in there), "level")
+    meant = {"elapsed": "duration" if "time" in there else "time", "level": level}
     unclear = [column for column in columns if "|" in column.role]
     readings = [column.role.split("|") for column in unclear]
     ways = [

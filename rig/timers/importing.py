@@ -125,7 +125,7 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
     channels = reading.layout.channels
     inputs = [f"input {x} is the gate at channel {n}" for x, n in channels.items() if x]
     lines = [*reading.file.lines, *inputs, str(reading.layout), *filter(None, [match.text])]
-    drops = [reading.drop(n) for n in range(len(reading.runs))]
+    drops = [*map(reading.drop, range(len(reading.runs)))]
     return Import(drops, channels, lines, notes)
 
 
@@ -202,9 +202,8 @@ def _refuse_impossible(reading: FileReading, place: str) -> None:
     if is_wire and "groups" not in file.stated:
         raise refusal(place, "one_wire", option=str(layout))
     earlier: dict[object, int] = {}
-    for n in range(len(reading.runs)):
-        drop = reading.drop(n)
-        lines = tuple(reading.line[reading.parts[n]].tolist())
+    for n, part in enumerate(reading.parts):
+        drop, lines = reading.drop(n), tuple(reading.line[part].tolist())
         # Of coarse times those of a whole drop are a copy's; of fine ones, rows may be missing.
         is_coarse = all(edge.tick % _COARSE == 0 for edge in drop.edges)
         moments: set[object] = {drop.edges} if is_coarse else {*drop.edges}
@@ -275,9 +274,8 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
     names = {"dark": "dark", "unit": "unit", "channel": labels[0] or "input"}
     if options.channel is not None and len(labels) > 1:
         raise refusal("--channel", "inputs_several", inputs=", ".join(labels))
-    for option, name in names.items():
-        if (value := getattr(options, option)) is not None:
-            texts[f"--{option}"] = f"{name}={value}"
+    given = {x: getattr(options, x) for x in names if getattr(options, x) is not None}
+    texts |= {f"--{x}": f"{names[x]}={value}" for x, value in given.items()}
     texts |= {"--map": options.map} if options.map is not None else {}
     settings = {*SETTINGS}.difference(labels)
     for place, text in texts.items():

@@ -147,8 +147,7 @@ class SignalReader:
         if self.unused and not self.places and self.signals[0].value.role == "moment":
             steps = [b[1] - a[1] for a, b in itertools.pairwise(self.changes)]
             if len(steps) > 3 and max(steps) < 1.5 * min(steps):
-                line = self.changes[0][0]
-                file.problems.refuse(line, "regular_samples", columns=self.unused)
+                file.problems.refuse(self.changes[0][0], "regular_samples", columns=self.unused)
         for n, signal in enumerate(self.signals):
             if signal.value.role == "volts":
                 self._find_crossings(n, row)

@@ -197,9 +197,8 @@ class Table:
         if not self.separator:
             values = dict(_named_values(line))
             # Names that come again are of another row, which may not be lost.
-            again = [(name, n) for name, n in values if n and (name, 0) in self._names]
-            names = dict.fromkeys([*self._names, *again])
-            return [values.get(name, "") for name in names] if values else [line]
+            again = [x for x in values.keys() - self._names if (x[0], 0) in self._names]
+            return [values.get(x, "") for x in (*self._names, *again)] if values else [line]
         cells = split_cells(line, self.separator, len(self._usual))
         missing, has_comma = vocabulary.words()["missing"], form("decimal comma").fullmatch
         cells = ["" if text[:5].casefold() in missing else text for text in cells]
@@ -254,8 +253,7 @@ class Table:
         if _shape(row.texts) == self._usual:  # as most
             return True
         # Above rows of several cells may stand a date, or a count.
-        is_wide = len(row.texts) > 1 or len(self._usual) < 2
-        is_data = is_wide and any(map(is_measured, row.texts))
+        is_data = (len(row.texts) > 1 or len(self._usual) < 2) and any(map(is_measured, row.texts))
         if is_data and all(map(kinds_of, filter(None, row.texts))):
             return True
         # One of data with a fault: some of it is a number, as in those above, or below their names.
