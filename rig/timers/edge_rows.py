@@ -41,7 +41,7 @@ def read_edges(path: str | Path) -> list[Drop]:
     InputError
         Every fault at its place.
     """
-    problems, header = ProblemList(str(path)), ",".join(HEADER)
+    problems = ProblemList(str(path))
     rows = (
         Row(number, split_cells(line, ","), line)
         for number, line in enumerate(read_lines(path), 1)
@@ -52,8 +52,7 @@ def read_edges(path: str | Path) -> list[Drop]:
     last: dict[tuple[int, int], int] = {}
     for row in rows:
         if len(row.texts) != len(HEADER):
-            values = {"values": len(row.texts), "needed": len(HEADER), "header": header}
-            problems.add(row.line, 1, "", "wrong_width", **values)
+            problems.add(row.line, 1, "", "wrong_width", values=len(row.texts))
             continue
         cells = list[Any]()
         for n, (text, (pattern, read, accepted)) in enumerate(zip(row.texts, _CELLS, strict=True)):

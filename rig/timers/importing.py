@@ -7,7 +7,6 @@ decides is asked, and rows of which no edge is made are refused.
 from __future__ import annotations
 
 import itertools
-import math
 from argparse import Namespace
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -251,7 +250,7 @@ def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]
         yield make_reason("several_drops", drops=len(reading.runs), pause_s=layout.pause_s)
     if file.period:
         period_us = file.period / 10 ** POWERS[layout.unit or "s"] / 1e6
-        yield make_reason("samples", period_us=period_us, u_us=period_us / math.sqrt(12.0))
+        yield make_reason("samples", period_us=period_us, u_us=period_us / 12.0**0.5)
     if absent := [str(n) for n in gates if n not in channels.values()]:
         yield make_reason("gates_absent", channels=", ".join(absent))
     if opposite := {"high": "low", "low": "high"}.get(layout.dark):

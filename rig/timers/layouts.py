@@ -108,7 +108,8 @@ class FileReading:
         is_guess = "guess" in file.facts or layout.groups == "passing"
         self.least_share = _GOOD_GUESS if is_guess else _GOOD
         changes, drop = group_changes(file, layout.unit, layout.groups, layout.pause_s)
-        label, channels = changes["label"], [layout.channels.get(name, -1) for name in file.names]
+        label, names = changes["label"], [*file.names]
+        channels = [layout.channels.get(name, -1) for name in names]
         if layout.groups == "passing":  # of gates that are passed one by one, each has as many
             channels = [*layout.channels.values()]
             share = np.maximum(1, np.bincount(drop)[drop] // len(channels))
@@ -125,20 +126,21 @@ class FileReading:
         _, starts = np.unique(drop, return_index=True)
         is_late = changes["tick"] > changes["tick"][starts][drop]
         is_odd = changes["first"] & blocked & (channel >= 0) & ~is_late
-        self.firsts = [[*file.names][n] for n in np.unique(changes["label"][is_odd])]
+        self.firsts = [names[n] for n in np.unique(changes["label"][is_odd])]
         is_change = ~changes["first"] | (blocked & (is_late | (layout.first == "change")))
         is_edge = is_change & (channel >= 0)
         self.dropped = {*changes["line"][is_change & ~is_edge].tolist()}
         _, first, places = np.unique(drop[is_edge], return_index=True, return_inverse=True)
         name = changes["run"][is_edge][first]
-        numbers = [-1 if (n := number_of(x)) is None else n for x in file.names]
+        numbers = [-1 if (n := number_of(x)) is None else n for x in names]
         runs = np.array(numbers)[name]
         runs += np.any(runs == 0)  # a file may count its runs from 0
         runs[(runs < 0) | (count_before(runs) > 0)] = 0
         free = np.setdiff1d(np.arange(1, 1 + 2 * len(runs)), runs)
         runs[runs == 0] = free[: np.sum(runs == 0)]
-        names = np.array([*file.names])[name].tolist()
-        called = zip(names, runs.tolist(), strict=True) if any(names) else ()
+        called = (
+            (names[at], run) for at, run in zip(name, runs.tolist(), strict=True) if name.any()
+        )
         self.renamed = {x or "one without a name": n for x, n in called if number_of(x) != n}
         runs = runs[places]
         order = np.flatnonzero(is_edge)[np.argsort(runs, kind="stable")]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import codecs
 import os
 from collections.abc import Generator
-from functools import partial
 from pathlib import Path
 
 from rig.files import require_file
@@ -54,8 +53,8 @@ def read_lines(path: str | Path) -> Generator[str]:
         elif b"\0" in start:
             problems.refuse(1, "not_text")
         with Path(path).open(encoding=encoding, errors="windows") as stream:
-            read_line = partial(stream.readline, LONGEST_LINE)
-            for number, line in enumerate(iter(read_line, ""), 1):
+            lines = iter(lambda: stream.readline(LONGEST_LINE), "")
+            for number, line in enumerate(lines, 1):
                 if len(line) == LONGEST_LINE:
                     problems.refuse(number, "not_text")
                 yield line.rstrip("\n")

@@ -13,7 +13,6 @@ from array import array
 from collections.abc import Iterator
 from contextlib import closing
 from functools import lru_cache
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -55,7 +54,7 @@ def read_file(file: TimerFile) -> TimerFile:
         file.lines += [f"a table, its cells separated by {_MARKS[table.separator]}"]
         readers: dict[object, SignalReader] = {}
         changes = [np.empty(0, CHANGE)]
-        for block, group in itertools.groupby(table.rows(), attrgetter("block")):
+        for block, group in itertools.groupby(table.rows(), lambda row: row.block):
             rows = iter(group)
             sample = list(itertools.islice(rows, _SAMPLE))
             if block.key not in readers:
@@ -112,13 +111,11 @@ class SignalReader:
         is_level = self.is_sampled and "volts" not in used and not self.places
         self.levels = [value.at for _, value, *_ in self.signals] if is_level else []
         needed = {x.at for signal in self.signals for x in signal[:2]} | {*self.places.values()}
-        unused = (x.name for x in columns if x.role != "index" and x.at not in needed)
-        self.unused = ", ".join(unused)
+        self.unused = ", ".join(x.name for x in columns if x.role != "index" and x.at not in needed)
         file.notes += [make_reason("columns_unused", columns=self.unused)] if self.unused else []
         file.lines += [f"  {column.name}: {column.meaning}" for column in columns]
-        is_named = any(clock.run for clock in self.clocks)
-        called = {re.sub("[0-9]+", "", clock.name) for clock in self.clocks}
-        is_wide = len(self.clocks) > len(called) == 1 and not (self.is_sampled or is_named)
+        called = {re.sub("[0-9]+", "", clock.name) for clock in self.clocks if not clock.run}
+        is_wide = len(self.clocks) > len(called) == 1 and not self.is_sampled
         is_guess = bool(self.above) or file.ways > 1
         file.facts |= {*self.places, *["sampled"] * self.is_sampled}
         file.facts |= {*["wide"] * is_wide, *["guess"] * is_guess}

@@ -10,11 +10,9 @@ from __future__ import annotations
 import csv
 import itertools
 import re
-import string
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from operator import itemgetter
 from typing import NamedTuple
 
 from rig.timers import vocabulary
@@ -96,7 +94,7 @@ class RowBlock:
                 and all(_UNFILLED & roles_in(text) for text in filter(None, row.texts[width:]))
             ):
                 ranked.append((known, len({*row.texts}), row))
-        return max(reversed(ranked), key=itemgetter(0, 1), default=(None,))[-1]
+        return max(reversed(ranked), key=lambda rank: rank[:2], default=(0, 0, None))[-1]
 
     def find_time_base(self) -> TimeBase | None:
         """Return the first sample's time and the step, s, that settings state; `None` without."""
@@ -119,7 +117,7 @@ class RowBlock:
             labels = [vocabulary.find_label(text.rpartition(":")[2], "gate") for text in row.texts]
             if len(named := [*filter(None, labels)]) == count:
                 return named
-        return [*string.ascii_uppercase]  # for a number may be taken for that of a gate
+        return [*"ABCDEFGHIJKLMNOPQRSTUVWXYZ"]  # for a number may be taken for that of a gate
 
 
 class Row(NamedTuple):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import re
 import unicodedata
 from functools import cache, lru_cache
@@ -84,8 +83,9 @@ def unit_of(heading: str) -> str:
     """
     text = normal(heading)
     units = form("bracketed unit").findall(text)
-    possible = itertools.product((*units, *form("last word").findall(text)), (*POWERS, "v"))
-    known = (unit for word, unit in possible if word in words()[f"unit {unit}"])
+    last = form("last word").findall(text)
+    pairs = ((word, unit) for word in (*units, *last) for unit in (*POWERS, "v"))
+    known = (unit for word, unit in pairs if word in words()[f"unit {unit}"])
     return next(known, units[-1] if units else "")
 
 
