@@ -14,8 +14,6 @@ _HYSTERESIS = 0.2
 """Share of the swing between dark and bright, half of it on either side of the middle."""
 _CLEAR_SWING = 8.0
 """Swing over the noise of each level below which there is no passage to be seen."""
-_ROUNDS = 10
-"""In which two means, one for each level, are found: of two levels, two or three are enough."""
 _SCATTER = 1.4826
 """Standard deviation over the median of absolute deviations, of normal noise."""
 
@@ -46,7 +44,7 @@ def find_crossings(samples: Array, threshold: tuple[float, float]) -> Array:
 def find_threshold(volts: Array) -> tuple[float, float] | None:
     """Return the middle between two levels, and half the hysteresis; `None` without two levels."""
     low, high = float(volts.min(initial=np.inf)), float(volts.max(initial=-np.inf))
-    for _ in range(_ROUNDS):
+    for _ in range(10):  # two means, one for each level: of two levels, two or three are enough
         above = volts > 0.5 * (low + high)
         if above.all() or not above.any():
             return None

@@ -273,8 +273,11 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
     names = {"dark": "dark", "unit": "unit", "channel": labels[0] or "input"}
     if options.channel is not None and len(labels) > 1:
         raise refusal("--channel", "inputs_several", inputs=", ".join(labels))
-    given = {x: getattr(options, x) for x in names if getattr(options, x) is not None}
-    texts |= {f"--{x}": f"{names[x]}={value}" for x, value in given.items()}
+    texts |= {
+        f"--{option}": f"{name}={value}"
+        for option, name in names.items()
+        if (value := getattr(options, option)) is not None
+    }
     texts |= {"--map": options.map} if options.map is not None else {}
     settings = {*SETTINGS}.difference(labels)
     for place, text in texts.items():

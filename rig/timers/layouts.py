@@ -138,10 +138,9 @@ class FileReading:
         runs[(runs < 0) | (count_before(runs) > 0)] = 0
         free = np.setdiff1d(np.arange(1, 1 + 2 * len(runs)), runs)
         runs[runs == 0] = free[: np.sum(runs == 0)]
-        called = (
-            (names[at], run) for at, run in zip(name, runs.tolist(), strict=True) if name.any()
-        )
-        self.renamed = {x or "one without a name": n for x, n in called if number_of(x) != n}
+        called = zip(map(names.__getitem__, name), runs.tolist(), strict=True)
+        unlike = {x or "one without a name": n for x, n in called if number_of(x) != n}
+        self.renamed = unlike if name.any() else {}
         runs = runs[places]
         order = np.flatnonzero(is_edge)[np.argsort(runs, kind="stable")]
         self.line, self.tick = changes["line"][order], changes["tick"][order]

@@ -103,13 +103,14 @@ class SignalReader:
         filled = {x.at: sum(row.cell(x.at) != "" for row in sample) for x in columns}
         values = [filled[at] for _, value, *_ in self.signals if (at := value.at) in filled]
         is_filled = 2 * sum(values) > len(values) * len(sample)
-        named = [x for x in columns[::-1] if x.role in {"run", "gate"} and "volts" not in used]
+        has_volts = "volts" in used
+        named = [x for x in columns[::-1] if x.role in {"run", "gate"} and not has_volts]
         self.places = {x.role: x.at for x in named}
         self.above = {x: "" for x, at in self.places.items() if 2 * filled[at] <= len(sample)}
-        self.is_sampled = "volts" in used or ("level" in used and is_filled)
+        self.is_sampled = has_volts or ("level" in used and is_filled)
         self.is_whole = is_filled and (self.is_sampled or len(values) > len(self.clocks))
-        is_level = self.is_sampled and "volts" not in used and not self.places
-        self.levels = [value.at for _, value, *_ in self.signals] if is_level else []
+        is_level = self.is_sampled and not (has_volts or self.places)
+        self.levels = [x.value.at for x in self.signals if is_level]
         needed = {x.at for signal in self.signals for x in signal[:2]} | {*self.places.values()}
         self.unused = ", ".join(x.name for x in columns if x.role != "index" and x.at not in needed)
         file.notes += [make_reason("columns_unused", columns=self.unused)] if self.unused else []
@@ -117,8 +118,8 @@ class SignalReader:
         called = {re.sub("[0-9]+", "", clock.name) for clock in self.clocks if not clock.run}
         is_wide = len(self.clocks) > len(called) == 1 and not self.is_sampled
         is_guess = bool(self.above) or file.ways > 1
-        file.facts |= {*self.places, *["sampled"] * self.is_sampled}
-        file.facts |= {*["wide"] * is_wide, *["guess"] * is_guess}
+        file.facts |= {*self.places, *["wide"] * is_wide, *["guess"] * is_guess}
+        file.facts |= {"sampled"} if self.is_sampled else set()
 
     def read(self, block: RowBlock, rows: Iterator[Row]) -> Changes:
         """Return the changes that rows say; a row may say that nothing changes, or be unread."""
@@ -178,13 +179,13 @@ class SignalReader:
 
     def _read_value(self, n: int, row: Row, tick: int | None) -> bool:
         """Keep what a cell says: a sample of volts, or a state if that is a change."""
-        signal, value = self.signals[n], self.signals[n].value
+        clock, value, _ = self.signals[n]
         word = row.cell(value.at)
         if tick is None or not (word or self.is_sampled or value.role == "moment"):
             return False
         state = code_of(value.role, value.words.get(word, word) or value.state)
         if value.role == "volts" and is_number(word):
-            self.samples[n].extend((row.line, tick - self.starts[signal.clock.at], float(word)))
+            self.samples[n].extend((row.line, tick - self.starts[clock.at], float(word)))
         elif state == _REJECTED:
             self._reject(row, value, word)
         elif state or not self.is_sampled:
@@ -214,17 +215,18 @@ class SignalReader:
 
     def _find_crossings(self, n: int, row: Row) -> None:
         """Keep where volts cross the middle; note how many do, or that nothing passes."""
-        signal, notes = self.signals[n], self.file.notes
+        clock, _, label = self.signals[n]
+        notes = self.file.notes
         samples = np.array(self.samples[n]).reshape(-1, 3)
         volts = samples[:, 2]
         if (threshold := find_threshold(volts)) is None:
             limits = {"low": min(volts, default=0), "high": max(volts, default=0)}
-            notes.append(make_reason("no_passage", input=signal.label, **limits))
+            notes.append(make_reason("no_passage", input=label, **limits))
             return
         crossings = find_crossings(samples, threshold).tolist()
         counts = {"crossings": len(crossings), "level": threshold[0]}
-        notes.append(make_reason("crossings", input=signal.label, **counts))
-        start, names = self.starts[signal.clock.at], self._names_of(n, row)
+        notes.append(make_reason("crossings", input=label, **counts))
+        start, names = self.starts[clock.at], self._names_of(n, row)
         for line, offset, is_high in crossings:
             state = STATES.index("high" if is_high else "low")
             self._keep(n, names, False, int(line), start + round(offset), state)
