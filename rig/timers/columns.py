@@ -70,12 +70,11 @@ class TimerColumn:
     state: str = ""
     words: Mapping[str, str] = field(default_factory=dict)
 
-    @property
-    def meaning(self) -> str:
-        """What it was taken for, in words."""
+    def __str__(self) -> str:
         meaning = " or ".join(roles()[role][0] for role in self.role.split("|"))
         meaning += f" in {vocabulary.SYMBOLS[self.power]}" * (self.role == "time")
-        return meaning + "".join(f": {word!r} is high" for word in [*self.words][:1])
+        high = "".join(f": {word!r} is high" for word in [*self.words][:1])
+        return f"{self.name}: {meaning}{high}"
 
 
 ROW_COUNT = TimerColumn(-1, "", "index")

@@ -224,8 +224,8 @@ def _account(reading: FileReading, options: Namespace) -> Reason:
     """Say what became of every row; refuse rows that are not used."""
     file, used = reading.file, set(reading.line)
     # A level that changes may be of an input that is no gate.
-    changed = file.changes["line"][~file.changes["first"]]
-    left = set() if "sampled" in file.facts else ({*changed.tolist()} - used) | reading.dropped
+    changed = file.changes[~file.changes["first"]]
+    left = set() if "sampled" in file.facts else (set(changed["line"]) - used) | reading.dropped
     unused = sorted({*file.unread, *left})
     counts = {"runs": len(reading.runs), "rows": file.rows, "edges": len(reading.line)}
     if not unused:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import re
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from functools import lru_cache
 from typing import Any
@@ -114,7 +114,7 @@ class SignalReader:
         needed = {x.at for signal in self.signals for x in signal[:2]} | {*self.places.values()}
         self.unused = ", ".join(x.name for x in columns if x.role != "index" and x.at not in needed)
         file.notes += [make_reason("columns_unused", columns=self.unused)] if self.unused else []
-        file.lines += [f"  {column.name}: {column.meaning}" for column in columns]
+        file.lines += [f"  {column}" for column in columns]
         called = {re.sub("[0-9]+", "", clock.name) for clock in self.clocks if not clock.run}
         is_wide = len(self.clocks) > len(called) == 1 and not self.is_sampled
         is_guess = bool(self.above) or file.ways > 1
@@ -133,9 +133,7 @@ class SignalReader:
             words = [row.cell(at) for at in self.levels] + row.texts[self.width :]
             if not self.levels or words != self.words or None in ticks.values():
                 self.words = words
-                said = [
-                    self._read_value(n, row, ticks[x.clock.at]) for n, x in enumerate(self.signals)
-                ]
+                said = [self._read_value(n, row, ticks) for n in range(len(self.signals))]
                 is_read = any(said) and not any(row.texts[self.width :])
                 file.unread += [] if is_read else [row.line]
             self.count += 1
@@ -177,10 +175,10 @@ class SignalReader:
         self.latest[clock.at] = tick
         return tick
 
-    def _read_value(self, n: int, row: Row, tick: int | None) -> bool:
+    def _read_value(self, n: int, row: Row, ticks: Mapping[int, int | None]) -> bool:
         """Keep what a cell says: a sample of volts, or a state if that is a change."""
         clock, value, _ = self.signals[n]
-        word = row.cell(value.at)
+        word, tick = row.cell(value.at), ticks[clock.at]
         if tick is None or not (word or self.is_sampled or value.role == "moment"):
             return False
         state = code_of(value.role, value.words.get(word, word) or value.state)
