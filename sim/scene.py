@@ -71,9 +71,9 @@ def set_scene(scheme: str, settings: Mapping[str, str]) -> Scene:
     truth = rest.pop("truth", "")
     dials = read_dials(rest, scheme)
     path = Path(truth) if truth else None
-    if path is not None:
-        _check_writable(scheme, path)
     lab = hang_chains(reader.read(source), dials, seed, partial(append_truth, path))
+    if path is not None:
+        _check_writable(scheme, path)  # which makes the file, so not for settings that are refused
     for each in (lab, *lab.others.values()):
         each.series = series
     return Scene(lab, dials, seed, pace)

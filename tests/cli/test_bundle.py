@@ -111,11 +111,13 @@ def test_a_byte_altered_anywhere_is_found_and_named(bundle, tmp_path):
     altered = tmp_path / "altered.eln"
     with zipfile.ZipFile(bundle) as archive:
         members, directory = archive.infolist(), archive.start_dir
-    for at in [directory, len(data) - 1, *(chance.randrange(len(data)) for _ in range(FLIPS))]:
+    for at in [directory + 4, len(data) - 1, *(chance.randrange(len(data)) for _ in range(FLIPS))]:
         flipped = bytearray(data)
         flipped[at] ^= chance.randrange(1, 256)
         altered.write_bytes(flipped)
-        name = [m.filename for m in members if m.header_offset <= at][-1].removeprefix(ROOT)
+        name = [m.filename for m in members if m.header_offset <= at % directory][-1].removeprefix(
+            ROOT
+        )
         try:
             faults = read_bundle(altered)[1]
         except InputError as error:  # its directory names no files any more
@@ -123,7 +125,7 @@ def test_a_byte_altered_anywhere_is_found_and_named(bundle, tmp_path):
             faults = [str(error)]
         # A file's size in the directory makes another file of it.
         assert faults, at
-        assert at >= directory or any(name in fault for fault in faults), (at, faults)
+        assert at > directory + 4 or any(name in fault for fault in faults), (at, faults)
     altered.write_bytes(data + b"\0")
     assert read_bundle(altered)[1]
 
