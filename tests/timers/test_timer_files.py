@@ -33,7 +33,8 @@ def drops_of(file, channels: dict[str, int], bars: int) -> list[Drop]:
     """Read a file in the most usual way, its inputs being as given."""
     file.stated["channels"] = channels
     layout = next(find_layouts(file, list(channels.values()), bars))
-    return FileReading(file, layout).drops
+    reading = FileReading(file, layout)
+    return list(map(reading.drop, range(len(reading.runs))))
 
 
 def read(tmp_path: Path, content: str | bytes, bars: int = 8) -> list[Drop]:
@@ -44,7 +45,7 @@ def read(tmp_path: Path, content: str | bytes, bars: int = 8) -> list[Drop]:
 
 def told(drop: Drop) -> list[tuple[float, bool]]:
     assert drop.tick_hz == TICK_HZ
-    assert all(edge.channel == 3 for edge in drop.edges)
+    assert {edge.channel for edge in drop.edges} == {3}
     return [(edge.tick / TICK_HZ, edge.blocked) for edge in drop.edges]
 
 
@@ -171,7 +172,7 @@ def test_of_a_dump_only_changes_of_unlisted_wires_are_refused(tmp_path):
         "$var real 64 0 volts $end\n$enddefinitions $end\n$comment\n100\n$end\n"
     )
     path.write_text(f"{head}#0 0! b0101 1a\nr1.5 0\n#400 1!\n#500 0!\n", "utf-8")
-    assert len(signals.read_file(TimerFile(path)).changes) == 3
+    assert signals.read_file(TimerFile(path)).changes.size == 3
     assert faults(tmp_path, f"{head}#0 0!\n#400 1!\n#500 0!\n1a\n") == [(12, 1, "wire")]
 
 
