@@ -128,6 +128,8 @@ def columns_of(
     shared |= _held({"rated": block.find_time_base()})
     columns = [_read_column(block, heading, n, facts[n] | shared, cells[n]) for n in facts]
     if heading is None:
+        if any(row.count_known() > 1 and len(row.texts) > width for row in block.headings):
+            file.problems.refuse(block.headings[0].line, "heading_unfit", columns=width)
         inputs = [column for column in columns if column.role in SAMPLED]
         for column, name in zip(inputs, block.find_inputs(len(inputs)), strict=False):
             column.gate = column.name = name

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable
 from fractions import Fraction
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -80,7 +79,7 @@ def read_edges(path: str | Path) -> list[Drop]:
 
 def make_drop(run: int, edges: Iterable[tuple[int, int, bool]]) -> Drop:
     """Make a drop of edges in ps: in order, counted from the whole second before the first."""
-    rows = sorted(edges, key=itemgetter(0))  # equal times stay in their order
+    rows = sorted(edges, key=lambda edge: edge[0])  # equal times stay in their order
     start = rows[0][0] // TICK_HZ * TICK_HZ
     first = {channel: blocked for _, channel, blocked in reversed(rows)}
     clear = sum(1 << channel for channel, blocked in first.items() if not blocked)

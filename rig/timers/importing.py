@@ -121,11 +121,12 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
     notes += [*match.doubts, *_assumptions(reading, gates)]
     if options.map_file is not None and not Path(options.map_file).exists():
         Path(options.map_file).write_text(f"{reading.layout.text}\n", "utf-8")
-    channels = reading.layout.channels
-    inputs = [f"input {x} is the gate at channel {n}" for x, n in channels.items() if x]
-    lines = [*reading.file.lines, *inputs, str(reading.layout), *filter(None, [match.text])]
+    pairs = [
+        f"input {x} is the gate at channel {n}" for x, n in reading.layout.channels.items() if x
+    ]
+    lines = [*reading.file.lines, *pairs, str(reading.layout), *filter(None, [match.text])]
     drops = [*map(reading.drop, range(len(reading.runs)))]
-    return Import(drops, channels, lines, notes)
+    return Import(drops, reading.layout.channels, lines, notes)
 
 
 def _find_readings(options: Namespace, gates: Sequence[int], bars: int) -> list[FileReading]:
@@ -243,7 +244,7 @@ def _some(lines: Sequence[int]) -> str:
 def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]:
     """Yield what is taken to be so, and what the file lacks."""
     file, layout, channels = reading.file, reading.layout, reading.layout.channels
-    if reading.renamed:
+    if reading.renamed and file.changes["run"].any():
         runs = ", ".join(f"{name} is run {n}" for name, n in reading.renamed.items())
         yield make_reason("runs_renamed", runs=runs)
     if layout.pause_s:

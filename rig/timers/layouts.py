@@ -132,15 +132,13 @@ class FileReading:
         self.dropped = {*changes["line"][is_change & ~is_edge].tolist()}
         _, first, places = np.unique(drop[is_edge], return_index=True, return_inverse=True)
         name = changes["run"][is_edge][first]
-        numbers = [-1 if (n := number_of(x)) is None else n for x in names]
-        runs = np.array(numbers)[name]
+        runs = np.array([-1 if (n := number_of(x)) is None else n for x in names])[name]
         runs += np.any(runs == 0)  # a file may count its runs from 0
         runs[(runs < 0) | (count_before(runs) > 0)] = 0
         free = np.setdiff1d(np.arange(1, 1 + 2 * len(runs)), runs)
         runs[runs == 0] = free[: np.sum(runs == 0)]
         called = zip(map(names.__getitem__, name), runs.tolist(), strict=True)
-        unlike = {x or "one without a name": n for x, n in called if number_of(x) != n}
-        self.renamed = unlike if name.any() else {}
+        self.renamed = {x or "one without a name": n for x, n in called if number_of(x) != n}
         runs = runs[places]
         order = np.flatnonzero(is_edge)[np.argsort(runs, kind="stable")]
         self.line, self.tick = changes["line"][order], changes["tick"][order]

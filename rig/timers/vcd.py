@@ -19,8 +19,9 @@ def vcd_rows(lines: Iterator[tuple[int, str]], problems: ProblemList) -> Iterato
     head = " ".join(line[:200] for _, line in itertools.islice(above, _LONGEST_HEAD))
     scale, names = form("time scale").search(head), dict(form("wire").findall(head))
     if scale is None or not names:
-        lacks = "a $timescale of 1, 10 or 100 s to ps, or without a wire of one bit"
-        problems.refuse(1, "no_rate", lacks=lacks)
+        problems.refuse(
+            1, "no_rate", lacks="a $timescale of 1, 10 or 100 s to ps, or without a wire of one bit"
+        )
     unit = f"e-{(POWERS | {'ps': 12})[scale[2]] - scale[1].count('0')}"
     yield 0, ",".join(["time (s)", *names.values()])
     at, time, levels, changes = 0, "0", dict.fromkeys(names, "x"), dict[str, str]()
