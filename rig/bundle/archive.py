@@ -132,9 +132,8 @@ def read_bundle(path: str | os.PathLike[str]) -> tuple[dict[str, bytes], list[st
     lists = (files[SUMS], list_hashes(covered)[SUMS])
     rows, again = (text.decode("utf-8", "replace").splitlines() for text in lists)
     names = sorted({row.partition("  ")[2] for row in {*rows} ^ {*again}})
-    faults = [f"{name} is not as {SUMS} has it" for name in names] or (
-        [f"{SUMS} is not as rig writes it"] * (rows != again)
-    )
+    faults = [f"{name} is not as {SUMS} has it" for name in names]
+    faults = faults or [f"{SUMS} is not as rig writes it"] * (rows != again)
     # The archive has a checksum of each file too: an altered file shows around it as well.
     return files, faults if faults or place.is_dir() else _check_archive(files, data)
 
@@ -170,8 +169,8 @@ def _check_archive(files: Mapping[str, bytes], data: bytes) -> list[str]:
         parts = {m.header_offset: f"the header of {m.filename}" for m in archive.infolist()}
         # The last time that a name stands there is in the directory, 46 bytes behind its entry.
         parts |= {
-            again.rindex(m.filename.encode()) - 46: f"its directory, at or behind {m.filename}"
-            for m in archive.infolist()
+            again.rindex(name.encode()) - 46: f"its directory, at or behind {name}"
+            for name in archive.namelist()
         }
     where = parts[max(begin for begin in parts if begin <= at)]
     return [f"the archive itself was altered at byte {at}, in {where}"]
