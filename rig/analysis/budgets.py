@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -57,19 +57,6 @@ class Budgets:
         for name, block in shared.blocks.items():
             self._common[block, _LINES[shared.rows[name].line]] = 1.0
 
-    @cached_property
-    def _gains(self) -> dict[int, Array]:
-        """Sum of GᵀG over all drops' own unknowns, by line of the budget."""
-        size = len(self._common)
-        gains: dict[int, Array] = {}
-        for drop in self.joint.drops if size else ():
-            lines = _prior_info(drop.model).line[drop.own]
-            for line in sorted(set(lines.tolist())):
-                gain = drop.gain[lines == line]
-                total = gains.setdefault(line, np.zeros((size, size)))
-                total[np.ix_(drop.here, drop.here)] += gain.T @ gain
-        return gains
-
     def measure_all(self, drop: JointDrop) -> dict[str, Measured]:
         """Return all measurands of the scene with budgets, by JSON name."""
         values = measurands(drop.model, drop.x)
@@ -98,23 +85,26 @@ class Budgets:
             The slopes in units of prior uncertainties, and both vectors. Products of `shared`
             vectors are covariances between drops, which may cancel when chains change places.
         """
+        inverse, gain = drop.solve()
         gradient = slopes * drop.model.unknowns.sd
-        own = gradient[..., drop.own]
-        response = gradient[..., drop.common] - own @ drop.gain
-        return gradient, own @ drop.inverse, response @ self.joint.inverse[drop.here]
+        own = gradient[..., drop.places.own]
+        response = gradient[..., drop.places.common] - own @ gain
+        return gradient, own @ inverse, response @ self.joint.inverse[drop.places.here]
 
     def _measure(self, drop: JointDrop, values: Sequence[Dual]) -> list[Measured]:
         """Return values with their uncertainty, degrees of freedom, budget and deviation."""
         gradient, by_root, shared = self.roots(drop, np.array([value.slopes for value in values]))
-        (line, *_), inner, nu = _prior_info(drop.model), drop.own, self.joint.degrees
-        common, solved = shared @ self.joint.inverse.T, by_root @ drop.inverse.T
-        behind = common[:, drop.here] @ drop.gain.T
+        (line, *_), inner, nu = _prior_info(drop.model), drop.places.own, self.joint.degrees
+        inverse, gain = drop.solve()
+        common, solved = shared @ self.joint.inverse.T, by_root @ inverse.T
+        behind = common[:, drop.places.here] @ gain.T
         own, place = solved - behind, np.eye(len(_LINES))[line[inner]]
         lines = own**2 @ place + common**2 @ self._common
-        # `_gains` is summed over all drops; replace this drop's share by its own rows.
+        # `gains` is summed over all drops; replace this drop's share by its own rows.
         shares = behind**2 @ place
-        for n, gains in self._gains.items():
-            lines[:, n] += np.maximum(0.0, np.sum(common @ gains * common, axis=1) - shares[:, n])
+        for name, gains in self.joint.gains.items():
+            others = np.sum(common @ gains * common, axis=1) - shares[:, _LINES[name]]
+            lines[:, _LINES[name]] += np.maximum(0.0, others)
         variances = np.sum(by_root**2, axis=1) + np.sum(shared**2, axis=1)
         # The rest comes from the edges; rounding may make it negative.
         lines[:, _LINES["edges"]] += np.maximum(0.0, variances - lines.sum(axis=1))
@@ -144,7 +134,7 @@ class Budgets:
         moved, solved
             w of the drop's own unknowns, and the same with the shared ones given.
         """
-        (line, predicted, absent), inner = _prior_info(drop.model), drop.own
+        (line, predicted, absent), inner = _prior_info(drop.model), drop.places.own
         root = self.joint.inverse  # R⁻¹, a square root of the shared covariance
         if root.size:  # widen guessed lines to their expanded uncertainty
             wider = (coverage_factor(GUESSED) / COVERAGE_95) ** 2
@@ -159,8 +149,11 @@ class Budgets:
             part = np.sum(common * error**2, axis=1, keepdims=True)
             return own - part[:, 0], np.sqrt(part), 0.0 * part
         moves, lost = np.zeros(shared.shape), np.zeros(len(root))
-        moves[:, drop.here], lost[drop.here] = true[:, drop.common], absent[drop.common]
-        without = direct @ drop.gain @ root[drop.here]
+        moves[:, drop.places.here], lost[drop.places.here] = (
+            true[:, drop.places.common],
+            absent[drop.places.common],
+        )
+        without = direct @ drop.solve()[1] @ root[drop.places.here]
         off = moves - shared @ root.T
         surplus, less = (off * np.sqrt(np.maximum(0.0, part)) for part in (-lost, lost))
         # hCh + h(Ce) + (eC)h is the form of h + e less that of e; e = −Gᵀ of the predicted ones.

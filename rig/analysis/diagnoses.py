@@ -17,7 +17,7 @@ from rig.analysis.chain_records import SIDES, ChainRecord, EdgeTrain
 from rig.analysis.distributions import most_by_chance
 from rig.analysis.equations import STRAY, standardise
 from rig.analysis.faults import Suspects, gate_values
-from rig.analysis.fit import Fit, Matches, match
+from rig.analysis.fit import DropFit, Fit, Matches, match
 from rig.arrays import Index
 from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, make_reason
@@ -166,7 +166,7 @@ def _values(protocol: Protocol, train: EdgeTrain) -> dict[str, Any]:
 
 
 def gates_too_low(
-    protocol: Protocol, records: Iterable[ChainRecord], fit: Fit | None
+    protocol: Protocol, records: Iterable[ChainRecord], drop: DropFit | None
 ) -> tuple[int, ...]:
     """Return the lowest gates beside the striking chain that miss more rods than by chance.
 
@@ -177,7 +177,7 @@ def gates_too_low(
     ----------
     records
         The chains with their trains.
-    fit
+    drop
         `None` if the drop is not identified: then the number of edges is used.
 
     Returns
@@ -185,7 +185,7 @@ def gates_too_low(
     tuple of int
         Numbers of the gates in the protocol's list.
     """
-    in_time = None if fit is None else match(fit.model, fit.x, late=False)
+    in_time = None if drop is None else match(drop.model, drop.x, late=False)
     counts = gate_counts(records, in_time)
     due, hidden = sum(gate.due for gate in counts), sum(gate.hidden for gate in counts)
     struck, gates = [gate for gate in counts if gate.role == "impact"], protocol.gates.gates

@@ -14,7 +14,7 @@ from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer
 from rig.analysis.faults import Premise, Suspects
-from rig.analysis.fit import Begun, DropFit, Fit, settle
+from rig.analysis.fit import Begun, DropFit, Fit, approach, settle
 from rig.analysis.gravity import free_gravity
 from rig.analysis.identify import DropIdentity, few_edges, identify, pattern_faults
 from rig.analysis.joint_fit import by_itself
@@ -150,18 +150,34 @@ class DropCase:
             reasons = (make_reason("record_damaged", text=drop.damage),)
             return DropResult(self.run, drop.attempt, "void", reasons, Audit(), damaged=True), None
         case = stated = self._at_contact()
-        reading, fit = stated._fit(readings)
-        with_all = reading, fit
-        while low := gates_too_low(case.protocol, case.records, fit):
-            case = replace(case, aside=(*case.aside, *low))
-            if fit is None:
+        reading = stated._identify(readings)
+        drop_fit = begun = stated._begin(reading)
+        tried = list[tuple[int, ...]]()
+        while True:
+            # Not identified with all gates, a drop says nothing about those that are left out.
+            counted = case if begun is None else stated
+            low = *counted.aside, *counted._too_low(drop_fit)
+            if low in tried:
+                break
+            tried.append(low)
+            case = replace(stated, aside=low)
+            if drop_fit is None or not low:
                 reading, fit = case._fit(readings)
             else:
-                fit = settle(case._model(fit.model.alpha), fit.x)
+                fit = settle(approach(case._model(drop_fit.model.alpha), drop_fit.x))
+            drop_fit = fit
+        if case.aside:
             without = result, _ = case._judge(reading, fit, readings, explain=False)
             if not is_wrong(result.reasons):
                 return without
-        return stated._judge(*with_all, readings, explain=explain)
+            reading, fit = stated._fit(readings)
+        return stated._judge(reading, fit, readings, explain=explain)
+
+    def _too_low(self, drop: DropFit | None) -> tuple[int, ...]:
+        """Return which of all gates are too low for a drop, fitted with any of them."""
+        if drop is not None and any(record.aside for record in drop.model.records.values()):
+            drop = DropFit(self._model(drop.model.alpha), {}, drop.x)
+        return gates_too_low(self.protocol, self.records, drop)
 
     def _at_contact(self) -> DropCase:
         return replace(self, protocol=of_run(self.protocol, self.run))
@@ -189,15 +205,22 @@ class DropCase:
     def _fit(self, readings: Readings) -> tuple[DropIdentity, Fit | None]:
         """Return the identification of the drop, and its fit if the edges match a fall."""
         reading = self._identify(readings)
-        begun = reading.begun
+        begun = self._begin(reading)
         if begun is None:
             return reading, None
-        model, x = self._model(begun.alpha), begun.x.copy()
-        clock = model.unknowns["clock"]
-        x[clock] = (1.0 + x[clock]) * self.scale.hz / reading.scale.hz - 1.0
-        fit = settle(model, x, begun.matches)
+        fit = settle(begun)
         unlike = few_edges(fit.shares, self.protocol.vocabulary)
         return replace(reading, unlike=unlike), None if unlike else fit
+
+    def _begin(self, reading: DropIdentity) -> DropFit | None:
+        """Return the identified drop at this time scale, roughly fitted."""
+        if reading.begun is None:
+            return None
+        alpha, matches, x = reading.begun
+        model, x = self._model(alpha), x.copy()
+        clock = model.unknowns["clock"]
+        x[clock] = (1.0 + x[clock]) * self.scale.hz / reading.scale.hz - 1.0
+        return approach(model, x, matches)
 
     def _judge(
         self, reading: DropIdentity, fit: Fit | None, readings: Readings, *, explain: bool

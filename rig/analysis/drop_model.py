@@ -93,7 +93,6 @@ class DropModel:
                 record, edges.rods, edges.levels, protocol, self._kappa
             )
         self._seen: dict[str, tuple[Index, Seen]] = {}
-        self.unknowns = Unknowns(self)
         self.slopes = {role: side_slopes(self, role) for role in self.records}
 
     @classmethod
@@ -116,7 +115,7 @@ class DropModel:
         """Return a copy with these attributes, and with priors recomputed from them."""
         model = self.with_edges(attributes.pop("records", self.records))
         vars(model).update(attributes)
-        model.unknowns = Unknowns(model)
+        vars(model).pop("unknowns", None)
         if "suspects" in attributes:
             model.slopes = {role: side_slopes(model, role) for role in model.records}
         return model
@@ -128,6 +127,11 @@ class DropModel:
         if records is not self.records:
             vars(model).pop("pairings", None)
         return model
+
+    @cached_property
+    def unknowns(self) -> Unknowns:
+        """Vector of the unknowns."""
+        return Unknowns(self)
 
     @cached_property
     def pairings(self) -> dict[str, Pairing]:

@@ -12,7 +12,7 @@ it explains (also an EM step), which keeps all positive. No component falls belo
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -61,41 +61,51 @@ class Evidence:
         self._members: dict[tuple[str, ...], list[Array]] = {}
         self._edges: list[tuple[Array, Array, Array]] = []
 
-    def members(self, kind: str, y: Array, root: Array) -> None:
+    def members(self, kind: str, y: Array, covariance: Array) -> None:
         """Add a block of unknowns, in units of their prior uncertainties.
 
         Parameters
         ----------
         kind
             Component that scales their prior; empty for a block without a variance component.
-        y, root
-            Estimates, and R of their covariance RRᵀ, which is diagonalized here; of many drops
-            with these as a first dimension.
+        y, covariance
+            Estimates, and their covariance, which is diagonalized here; of many drops with these
+            as a first dimension.
         """
         if kind and y.size:
-            variances, sums = np.linalg.eigh(root @ np.swapaxes(root, -1, -2))
+            variances, sums = np.linalg.eigh(covariance)
             told = np.maximum(1.0 - variances, np.finfo(float).eps)
             size = np.full(y.size, getattr(self.components, kind) ** -2)
             squares = ((y[..., None, :] @ sums)[..., 0, :] / told) ** 2
             rows = [size, squares.ravel(), (variances / told).ravel(), np.ones(y.size)]
             self._members.setdefault((kind,), []).append(np.stack(rows))
 
-    def drops(self, model: DropModel, y: Array, root: Array) -> None:
-        """Add the own unknowns of drops of a condition; `y` and `root` as in `members`."""
+    def drops(
+        self, model: DropModel, y: Array, told: Array, covariances: Mapping[str, Array]
+    ) -> None:
+        """Add the own unknowns of drops of a condition.
+
+        Parameters
+        ----------
+        y, told
+            Estimates in units of their prior uncertainties, and the share of each prior variance
+            that the edges remove; shape ``(drops, unknowns)``.
+        covariances
+            Covariances of blocks with a variance component, as in `members`.
+        """
         at = model.unknowns
-        for name, row in at.rows.items():
+        for name, covariance in covariances.items():
             # After the first strike, other departures of a chain look like swing.
-            if row.shared == "drop" and name in at and name != "impact swing":
-                self.members(row.scale, y[:, at[name]], root[:, at[name]])
+            if name in at and name != "impact swing":
+                self.members(at.rows[name].scale, y[:, at[name]], covariance)
         if "impulses" in at:
             # Convert to units of α², as conditions may differ in α.
             block, alpha = at["impulses"], abs(model.alpha)
             squares = (y[:, block] * at.sd[block]) ** 2
             record, size = model.records["impact"], np.full(squares.shape, alpha**2)
             single = size / above(record.chain.chain) ** 2
-            told = 1.0 - np.sum(root[:, block] ** 2, axis=-1)
             even = size * record.uneven**2
-            rows = [even, np.ones_like(size), single, squares, np.zeros_like(size), told]
+            rows = [even, np.ones_like(size), single, squares, np.zeros_like(size), told[:, block]]
             self._members.setdefault(_IMPULSES, []).append(np.stack(rows).reshape(len(rows), -1))
 
     def edges(self, residuals: Iterable[Residuals]) -> None:

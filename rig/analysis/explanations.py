@@ -24,7 +24,7 @@ from rig.analysis.chain_records import ChainRecord, chain_records
 from rig.analysis.diagnoses import RIGHT
 from rig.analysis.drop_model import DropModel
 from rig.analysis.faults import Fault, Premise, Suspects, faults
-from rig.analysis.fit import Fit, settle
+from rig.analysis.fit import Fit, approach, settle
 from rig.analysis.identify import (
     Reading,
     held_back,
@@ -181,7 +181,7 @@ class Explainer:
             wider = replace(
                 scales, stretch=_BEYOND * scales.stretch, landed=_BEYOND * scales.landed
             )
-            reading = weigh(settle(fit.model.copy_with(components=wider), fit.x.copy()))
+            reading = weigh(settle(approach(fit.model.copy_with(components=wider), fit.x)))
             yield Explanation(_NEITHER, {}, self._evidence(reading, self.stated.hz) - CLEAR)
 
     def _read_alone(self, record: ChainRecord) -> float:
@@ -305,7 +305,7 @@ class Explainer:
         score = scores(fit, [direction])
         model = fit.model.copy_with(suspects=(fault.suspect(fit.model, direction),))
         first = np.clip(score.size, -largest, largest) * np.append(score.follow, 1.0)
-        reading = weigh(settle(model, np.append(fit.x, 0.0) + first))
+        reading = weigh(settle(approach(model, np.append(fit.x, 0.0) + first)))
         estimate = reading.fit.estimate
         further, u = float(estimate.x[-1]), float(estimate.own_u[-1])
         if APART * u < abs(size + further) <= largest:

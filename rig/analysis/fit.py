@@ -29,7 +29,7 @@ CLOSE = 0.1
 no result changes by 0.001 standard uncertainties."""
 _FINE = 0.8e-3  # m, standard deviation of an edge about a fitted trajectory, for matching
 _NEAR = 10.0  # standard uncertainties: step length after which edges are matched again
-_ROUNDS = 7
+_ROUNDS = 6
 _MEDIANS = 2.2
 """Standard deviations for a median: 1/0.6745, times 1.5 for the scatter of few edges."""
 
@@ -95,29 +95,31 @@ class Fit(DropFit):
     estimate: Estimate
 
 
-def settle(model: DropModel, x: Array, matches: Matches | None = None) -> Fit:
-    """Match and fit in turn until the matches stay the same, and return the fit.
+def approach(model: DropModel, x: Array, matches: Matches | None = None) -> DropFit:
+    """Fit a drop roughly, and match its edges anew.
 
     Parameters
     ----------
     x
         Unknowns to begin with.
     matches
-        Matches to begin with, if any.
+        Matches to begin with; those at `x` if not given.
     """
-    rough, scatter = True, 1.0
     matches = match(model, x) if matches is None else matches
+    # This fit need not converge, as matches will change.
+    x = adjust(model, matches, x, done=_NEAR, rough=True).x
+    return DropFit(model, without_strays(model, x, match(model, x)), x)
+
+
+def settle(drop: DropFit) -> Fit:
+    """Fit and match in turn until the matches stay the same, and return the fit."""
+    model, scatter, x, matches = drop.model, 1.0, drop.x, drop.matches
     for _ in range(_ROUNDS):
-        # The first fit need not converge, as matches will change.
-        done = _NEAR if rough else CLOSE
-        estimate = adjust(model, matches, x, done=done, scatter=scatter, rough=rough)
-        used, x, scatter = matches, estimate.x, estimate.scatter
-        again = without_strays(model, x, match(model, x), scatter)
-        alike = all(np.array_equal(side, again[role]) for role, side in used.items())
-        if alike and not rough:
+        used, estimate = matches, adjust(model, matches, x, done=CLOSE, scatter=scatter)
+        x, scatter = estimate.x, estimate.scatter
+        matches = without_strays(model, x, match(model, x), scatter)
+        if all(np.array_equal(side, matches[role]) for role, side in used.items()):
             break
-        # Keep the same object if the matches are equal, as results are cached for it.
-        matches, rough = used if alike else again, False
     return Fit(model, used, x, estimate)
 
 

@@ -30,7 +30,7 @@ from rig.analysis.annealing import (
 from rig.analysis.chain_records import SIDES, ChainRecord
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY
-from rig.analysis.fit import Begun, DropFit, Fit, settle
+from rig.analysis.fit import Begun, DropFit, Fit, approach, settle
 from rig.arrays import Index
 from rig.clock.calibration import TimeScale
 from rig.protocol.gates import CLEARANCE_M
@@ -101,7 +101,7 @@ class Identification:
         drop = self.drop
         if drop is None:
             return None
-        fit = drop if isinstance(drop, Fit) else settle(drop.model, drop.x, drop.matches)
+        fit = drop if isinstance(drop, Fit) else settle(approach(drop.model, drop.x, drop.matches))
         reading = weigh(fit)
         return reading if reading.evidence > 0.0 else None
 
@@ -283,7 +283,7 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[FallFit]]) -> Id
     drops = [_begin(model, dict(zip(readings, pair, strict=True))) for pair in close]
     best, evidence, odds, other = drops[0], likeliest, further, None
     if len(drops) > 1:
-        tried = [weigh(settle(drop.model, drop.x, drop.matches)) for drop in drops]
+        tried = [weigh(settle(approach(drop.model, drop.x, drop.matches))) for drop in drops]
         likelier, *rest = _rank_readings(tried)
         best, evidence = likelier.fit, likelier.evidence
         if rest:

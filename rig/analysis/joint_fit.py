@@ -9,9 +9,10 @@ nuisance parameters are estimated on the way (`rig.analysis.evidence`).
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -20,10 +21,17 @@ from rig.analysis.components import Components, priors
 from rig.analysis.equations import STRAY, Residuals, standardise
 from rig.analysis.evidence import Evidence
 from rig.analysis.fit import DropFit, Fit
-from rig.analysis.joint_step import DropGroup, JointDrop, group_drops, joint_step, with_priors
+from rig.analysis.joint_step import (
+    DropAlone,
+    DropGroup,
+    JointDrop,
+    Places,
+    group_drops,
+    joint_step,
+    with_priors,
+)
 from rig.analysis.likeness import Likeness, likeness
 from rig.analysis.result import Measured
-from rig.analysis.square_root import Elimination
 from rig.analysis.unknowns import SharedUnknowns
 from rig.arrays import Array
 from rig.plain_data import Record, attributes
@@ -82,6 +90,8 @@ class JointFit:
         Fitted drops in the order given.
     settled
         Whether the fit converged; if not, `drops` may be empty.
+    gains
+        As for `rig.analysis.joint_step.DropGroup.add_gains`.
     """
 
     shared: SharedUnknowns
@@ -92,6 +102,7 @@ class JointFit:
     degrees: Mapping[str, float]
     drops: tuple[JointDrop, ...]
     settled: bool
+    gains: Mapping[str, Array] = field(default_factory=dict)
 
     @cached_property
     def covariance(self) -> Array:
@@ -148,9 +159,9 @@ class JointFit:
 def by_itself(fit: Fit) -> JointFit:
     """Return the joint fit of a single drop without shared unknowns."""
     shared, x = SharedUnknowns(()), np.zeros(0)
-    own, none = np.arange(fit.x.size), np.zeros(0, dtype=np.intp)
-    gain = np.zeros((own.size, 0))
-    drop = JointDrop(fit.model, fit.matches, fit.x, own, none, none, fit.estimate.inverse, gain)
+    none = np.zeros(0, dtype=np.intp)
+    places = Places(np.arange(fit.x.size), none, none)
+    drop = DropAlone(fit.model, fit.matches, fit.x, places, fit.matches, fit.estimate)
     degrees = {"jitter": fit.estimate.degrees, "impulse": GUESSED}
     components, settled = fit.model.components, fit.estimate.settled
     return JointFit(shared, x, x, np.zeros((0, 0)), components, degrees, (drop,), settled)
@@ -165,33 +176,32 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
     fits
         Good drops, each fitted by itself or in an earlier joint fit.
     """
-    shared = SharedUnknowns(fit.model for fit in fits)
-    groups = group_drops(fits, shared)
+    shared, groups = group_drops(fits)
     x, beforehand = _average(groups, len(shared)), priors(fits[0].model.protocol)
     evidence = Evidence(beforehand, beforehand)
     settled, moved, size, before = False, 0.0, len(shared), evidence.components
     previous = np.zeros(size + len(before.__slots__))
     damping = np.ones_like(previous)
-    inverse, reduced = np.eye(size), list[Elimination]()
     for round_ in range(_ROUNDS):
-        reduced.clear()  # of all drops, as `residuals`: most of the memory
         groups = with_priors([group.at(x) for group in groups], evidence.components)
         if round_ == _REMATCH:
             groups = [group.rematch() for group in groups]
         # In the first round shared and own unknowns do not fit together yet: cut no residuals.
-        sd, root, reduced = joint_step(groups, x, cut=STRAY if round_ else math.inf)
+        cut = STRAY if round_ else math.inf
+        sd, root, groups = joint_step(groups, x, cut)
         step = damping[:size] * root.step()
-        moves = _move(groups, reduced, x, sd, step) if np.isfinite(step).all() else None
+        moves = _move(groups, x, sd, step) if np.isfinite(step).all() else None
         if moves is None:
-            return JointFit(shared, x, sd, inverse, before, evidence.degrees, (), settled=False)
+            return JointFit(
+                shared, x, sd, np.eye(size), before, evidence.degrees, (), settled=False
+            )
         x, groups, residuals = moves
         inverse = np.linalg.inv(root.matrix).astype(np.float64, copy=False)
         last, moved = moved, float(np.abs(step / np.linalg.norm(inverse, axis=1)).max())
         before = evidence.components
         evidence = Evidence(before, beforehand)
         evidence.edges(residuals)
-        residuals.clear()
-        _weigh(evidence, shared, x, sd, inverse, groups, reduced)
+        _weigh(evidence, shared, x, sd, inverse, groups)
         # With linear convergence, the next step is shorter by the ratio of the last two.
         settled = round_ > _REMATCH and (moved < _DONE or moved**2 < _DONE * last)
         if settled and _steady(before, evidence.components, groups):
@@ -203,15 +213,17 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
         if round_ > _REMATCH:
             damping[ahead * previous < 0.0] *= 0.5
         previous = ahead
-    parts = zip(groups, reduced, strict=True)
-    placed = dict(drop for group, part in parts for drop in group.split(part))
+    gains = defaultdict[str, Array](partial(np.zeros, (size, size)))
+    for group in groups:
+        group.add_gains(gains)
+    placed = dict(drop for group in groups for drop in group.split())
     drops = tuple(placed[n] for n in sorted(placed))
     # Return the components used for this solution, not the updated ones.
-    return JointFit(shared, x, sd, inverse, before, evidence.degrees, drops, settled)
+    return JointFit(shared, x, sd, inverse, before, evidence.degrees, drops, settled, gains)
 
 
 def _move(
-    groups: Sequence[DropGroup], reduced: Sequence[Elimination], x: Array, sd: Array, step: Array
+    groups: Sequence[DropGroup], x: Array, sd: Array, step: Array
 ) -> tuple[Array, list[DropGroup], list[Residuals]] | None:
     """Take a step, shortened until all residuals are finite.
 
@@ -224,10 +236,7 @@ def _move(
     share = 1.0
     while share > _SHORTEST:
         common = x + share * step * sd
-        moved = [
-            group.move(part, common, step, share)
-            for group, part in zip(groups, reduced, strict=True)
-        ]
+        moved = [group.move(common, step, share) for group in groups]
         remaining = [
             group.model.residuals(role, group.x, edges)
             for group in moved
@@ -243,8 +252,8 @@ def _average(groups: Sequence[DropGroup], size: int) -> Array:
     """Return the mean of the drops' own estimates of each shared unknown."""
     total, count = np.zeros(size), np.zeros(size)
     for group in groups:
-        total[group.here] += group.x[:, group.common].sum(axis=0)
-        count[group.here] += len(group.x)
+        total[group.places.here] += group.x[:, group.places.common].sum(axis=0)
+        count[group.places.here] += len(group.x)
     return total / count
 
 
@@ -255,26 +264,24 @@ def _weigh(
     sd: Array,
     inverse: Array,
     groups: Sequence[DropGroup],
-    reduced: Sequence[Elimination],
 ) -> None:
     """Estimate the variance components from residuals and estimates."""
     remaining = np.sum(inverse**2, axis=1)
     for name, block in shared.blocks.items():
         places = np.arange(len(shared))[block]
         places = places[sd[places] > 0.0]
-        evidence.members(shared.rows[name].scale, x[places] / sd[places], inverse[places])
+        root = inverse[places]
+        evidence.members(shared.rows[name].scale, x[places] / sd[places], root @ root.T)
     parameters = float(np.sum((1.0 - remaining)[sd > 0.0]))
     struck = 0.0
-    for group, (own_inverse, gain, _, _) in zip(groups, reduced, strict=True):
-        at, own = group.model.unknowns, group.own
-        # Variance of an own unknown: given the shared ones, plus the part that these contribute.
-        root = np.zeros((*group.x.shape, own.size + x.size))
-        root[:, own] = np.concatenate([own_inverse, gain @ inverse[group.here]], axis=-1)
-        told = 1.0 - np.sum(root**2, axis=-1)
-        parameters += float(np.sum(told[:, own][:, at.sd[own] > 0.0]))
+    for group in groups:
+        at, told = group.model.unknowns, np.zeros(group.x.shape)
+        variances, blocks = group.told(inverse)
+        told[:, group.places.own] = 1.0 - variances
+        parameters += float(np.sum(told[:, at.sd > 0.0]))
         if "impulses" in at:
             struck += float(np.sum(told[:, at["impulses"]]))
-        evidence.drops(group.model, standardise(group.x, at.sd), root)
+        evidence.drops(group.model, standardise(group.x, at.sd), told, blocks)
     evidence.estimate_components(parameters, struck)
 
 

@@ -6,12 +6,14 @@ Drops of a condition differ only in their edges, so that they are fitted as arra
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
+from rig.analysis.adjust import Estimate
 from rig.analysis.annealing import matched
-from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import Components
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY, Seen, linearize, standardise
@@ -24,11 +26,25 @@ from rig.analysis.square_root import (
     eliminate,
     square_root,
 )
-from rig.analysis.unknowns import SharedUnknowns
+from rig.analysis.unknowns import SharedUnknowns, Unknown
 from rig.arrays import Array, Index
 
 _AT_ONCE = 1_000_000
 """Derivatives of edges in an array: 8 MB. More are no quicker."""
+
+
+class Places(NamedTuple):
+    """Places of a drop's unknowns.
+
+    Attributes
+    ----------
+    own, common, here
+        Of its own and of the shared unknowns in its vector, and of the latter in the session's.
+    """
+
+    own: Index
+    common: Index
+    here: Index
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,18 +53,50 @@ class JointDrop(DropFit):
 
     Attributes
     ----------
-    own, common, here
-        Places of its own and of the shared unknowns in the drop's vector, and of the latter in the
-        session's vector.
-    inverse, gain
-        As in `rig.analysis.square_root.Elimination`.
+    places
+        Places of its unknowns.
+    fitted
+        Matches of the fit: `matches` and strays.
     """
 
-    own: Index
-    common: Index
-    here: Index
-    inverse: Array
-    gain: Array
+    places: Places
+    fitted: Matches
+
+    def solve(self) -> tuple[Array, Array]:
+        """Return R⁻¹ and gain of its own unknowns, as in `rig.analysis.square_root.Elimination`."""
+        return _solve(self)
+
+
+@lru_cache(maxsize=1)  # those of all drops would take most of the memory
+def _solve(drop: JointDrop) -> tuple[Array, Array]:
+    # What a model prepares of its edges goes with the copy.
+    model = drop.model.with_edges(drop.model.records)
+    return _eliminate(model, drop.fitted, drop.x, drop.places)[:2]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DropAlone(JointDrop):
+    """A drop that shares nothing with others.
+
+    Attributes
+    ----------
+    estimate
+        Result of its own fit.
+    """
+
+    estimate: Estimate
+
+    def solve(self) -> tuple[Array, Array]:
+        """Return R⁻¹ of its fit."""
+        return self.estimate.inverse, np.zeros((self.x.size, 0))
+
+
+def _eliminate(
+    model: DropModel, edges: Matches | Mapping[str, Seen], x: Array, at: Places, cut: float = STRAY
+) -> Elimination:
+    """Eliminate the own unknowns of a drop, or of many."""
+    rows = [*linearize(model, edges, x, cut=cut).rows.values()]
+    return eliminate(rows, model.unknowns.sd, model.unknowns.pull(x), at.own, at.common)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,63 +105,112 @@ class DropGroup:
 
     Attributes
     ----------
-    places
-        Places of the drops in the session.
+    numbers
+        Numbers of the drops in the session.
     model
         Of all of them; its edges are those of any drop.
-    records, matches
-        Chains of each drop, and its matches, by role.
+    drops
+        Each drop with its matches.
     edges
         Matched edges by role, shape ``(drops, expected)``; where none is matched, a time that is
         infinitely uncertain.
     x
         Unknowns, shape ``(drops, unknowns)``.
-    own, common, here
-        As in `JointDrop`.
+    places
+        Places of the unknowns.
+    best, gain
+        Least-squares step of the drops' own unknowns, in units of their prior uncertainties, and
+        the mean of its derivatives by the shared ones; drops of a condition hardly differ in these.
+    variances, blocks
+        Variances of their own unknowns, given the shared ones, in units of the prior variances; and
+        the covariance of each block with a variance component. Shape ``(drops, own)``, and
+        ``(drops, members, members)``.
     """
 
-    places: Sequence[int]
+    numbers: Sequence[int]
     model: DropModel
-    records: Sequence[Mapping[str, ChainRecord]]
-    matches: Sequence[Matches]
+    drops: Sequence[DropFit]
     edges: Mapping[str, Seen]
     x: Array
-    own: Index
-    common: Index
-    here: Index
+    places: Places
+    best: Array = field(default_factory=lambda: np.zeros(0))
+    gain: Array = field(default_factory=lambda: np.zeros(0))
+    variances: Array = field(default_factory=lambda: np.zeros(0))
+    blocks: Mapping[str, Array] = field(default_factory=dict)
 
     def at(self, shared: Array) -> DropGroup:
         """Return the drops with other values of the session's shared unknowns."""
         x = self.x.copy()
-        x[:, self.common] = shared[self.here]
+        x[:, self.places.common] = shared[self.places.here]
         return replace(self, x=x)
 
-    def move(self, reduced: Elimination, shared: Array, step: Array, share: float) -> DropGroup:
+    def move(self, shared: Array, step: Array, share: float) -> DropGroup:
         """Return the drops after a share of a step to `shared`, in units of prior uncertainties."""
-        moved, at = self.at(shared), self.own
-        own = reduced.own - reduced.gain @ step[self.here]
-        moved.x[:, at] += share * self.model.unknowns.sd[at] * own
+        moved, own = self.at(shared), self.places.own
+        best = self.best - self.gain @ step[self.places.here]
+        moved.x[:, own] += share * self.model.unknowns.sd[own] * best
         return moved
+
+    def reduce(self, cut: float) -> tuple[DropGroup, EquationRows]:
+        """Eliminate the drops' own unknowns; return the drops, and what is left of the equations.
+
+        Parameters
+        ----------
+        cut
+            As for `rig.analysis.equations.linearize`.
+        """
+        here, blocks = self.places.here, {}
+        inverse, gain, best, rest = _eliminate(self.model, self.edges, self.x, self.places, cut)
+        for name, row, inside in self._own_blocks():
+            if row.scale:
+                blocks[name] = inverse[:, inside] @ np.swapaxes(inverse[:, inside], 1, 2)
+        variances = np.sum(inverse**2, axis=-1)
+        parts = {"best": best, "gain": gain.mean(axis=0), "variances": variances, "blocks": blocks}
+        slopes = rest.slopes.reshape(-1, here.size)
+        return replace(self, **parts), EquationRows(slopes, rest.left.ravel(), here)
+
+    def told(self, inverse: Array) -> tuple[Array, dict[str, Array]]:
+        """Return `variances` and `blocks` with shares of the shared unknowns, of R⁻¹ `inverse`."""
+        root, blocks = self.gain @ inverse[self.places.here], dict(self.blocks)
+        for name, _, inside in self._own_blocks():
+            if name in blocks:
+                blocks[name] = blocks[name] + root[inside] @ root[inside].T
+        return self.variances + np.sum(root**2, axis=1), blocks
+
+    def _own_blocks(self) -> Iterator[tuple[str, Unknown, slice]]:
+        """Yield the name, row, and places among the own unknowns of each of their blocks."""
+        end, at = 0, self.model.unknowns
+        for name, row in at.rows.items():
+            if row.shared == "drop":
+                begin, end = end, end + at[name].stop - at[name].start
+                yield name, row, slice(begin, end)
+
+    def add_gains(self, gains: Mapping[str, Array]) -> None:
+        """Add the sum of GᵀG over the drops' own unknowns to that of each line of the budget."""
+        inner = np.ix_(self.places.here, self.places.here)
+        for _, row, inside in self._own_blocks():
+            gains[row.line][inner] += len(self.drops) * self.gain[inside].T @ self.gain[inside]
 
     def rematch(self) -> DropGroup:
         """Return the drops with their edges matched anew."""
-        models = [self.model.with_edges(records) for records in self.records]
-        matches = [match(model, x) for model, x in zip(models, self.x, strict=True)]
-        return replace(self, matches=matches, edges=_edges(models, matches, self.x))
+        drops = [
+            DropFit(drop.model, match(self.model.with_edges(drop.model.records), x), x)
+            for drop, x in zip(self.drops, self.x, strict=True)
+        ]
+        return replace(self, drops=drops, edges=_edges(self.model, drops))
 
-    def split(self, reduced: Elimination) -> Iterator[tuple[int, JointDrop]]:
-        """Yield each drop with its place, its own unknowns eliminated, and without strays."""
-        places = self.own, self.common, self.here
-        drops = zip(self.places, self.records, self.matches, self.x, *reduced[:2], strict=True)
-        for n, records, matches, x, inverse, gain in drops:
-            kept = without_strays(self.model.with_edges(records), x, matches)
+    def split(self) -> Iterator[tuple[int, JointDrop]]:
+        """Yield each drop with its number, without strays."""
+        for n, drop, x in zip(self.numbers, self.drops, self.x, strict=True):
+            records = drop.model.records
+            kept = without_strays(self.model.with_edges(records), x, drop.matches)
             # The model anew: what it prepared of its edges takes more memory than all else.
             model = self.model.with_edges(records)
-            yield n, JointDrop(model, kept, x, *places, inverse, gain)
+            yield n, JointDrop(model, kept, x, self.places, drop.matches)
 
 
-def group_drops(fits: Sequence[DropFit], shared: SharedUnknowns) -> list[DropGroup]:
-    """Return drops that were fitted by themselves, or in an earlier joint fit, as groups."""
+def group_drops(fits: Sequence[DropFit]) -> tuple[SharedUnknowns, list[DropGroup]]:
+    """Group drops that were fitted by themselves or jointly, and return what all share."""
     # A rig has a single clock: its error is shared, with the largest calibration uncertainty.
     clock_u: dict[str | None, float] = {}
     alike: dict[object, list[int]] = {}
@@ -121,22 +218,19 @@ def group_drops(fits: Sequence[DropFit], shared: SharedUnknowns) -> list[DropGro
         rig, owners = model.owners.get("rig"), tuple(sorted(model.owners.items()))
         clock_u[rig] = max(model.clock_u, clock_u.get(rig, 0.0))
         alike.setdefault((model.condition, owners), []).append(n)
-    groups = []
-    for numbers in alike.values():
-        first = fits[numbers[0]].model
+    firsts = [fits[numbers[0]].model for numbers in alike.values()]
+    shared, groups = SharedUnknowns(firsts), []
+    for first, numbers in zip(firsts, alike.values(), strict=True):
         common, here = shared.places(first)
-        own = np.setdiff1d(np.arange(len(first.unknowns)), common)
+        places = Places(np.setdiff1d(np.arange(len(first.unknowns)), common), common, here)
         model = first.copy_with(clock_u=clock_u[first.owners.get("rig")])
         count = max(1, _AT_ONCE // sum(side.sights.size for side in model.slopes.values()))
-        for places in (numbers[n : n + count] for n in range(0, len(numbers), count)):
-            drops = [fits[n] for n in places]
+        for begin in range(0, len(numbers), count):
+            some = numbers[begin : begin + count]
+            drops = [fits[n] for n in some]
             x = np.array([drop.x for drop in drops])
-            records = [drop.model.records for drop in drops]
-            matches = [drop.matches for drop in drops]
-            edges = _edges([model.with_edges(each) for each in records], matches, x)
-            about = places, model, records, matches
-            groups.append(DropGroup(*about, edges, x, own, common, here))
-    return groups
+            groups.append(DropGroup(some, model, drops, _edges(model, drops), x, places))
+    return shared, groups
 
 
 def with_priors(groups: Sequence[DropGroup], components: Components) -> list[DropGroup]:
@@ -155,17 +249,18 @@ def with_priors(groups: Sequence[DropGroup], components: Components) -> list[Dro
     return changed
 
 
-def _edges(models: Sequence[DropModel], matches: Sequence[Matches], x: Array) -> dict[str, Seen]:
-    edges, at = {}, models[0].unknowns
-    for role, expected in models[0].expected.items():
-        times = np.empty((len(models), expected.rods.size))
+def _edges(model: DropModel, drops: Sequence[DropFit]) -> dict[str, Seen]:
+    edges, at = {}, model.unknowns
+    models = [model.with_edges(drop.model.records) for drop in drops]
+    for role, expected in model.expected.items():
+        times = np.empty((len(drops), expected.rods.size))
         burst = np.full(times.shape, np.inf)
-        # Any moment after the release: at rest, a chain has no uncertainty.
-        fallen = x[:, at[f"{role} release"]] + 1.0
-        for n, model in enumerate(models):
-            pairing = model.pairings[role]
-            pick, edge = matched(matches[n][role])
-            times[n] = pairing.times[edge].max() if edge.size else fallen[n]
+        for n, drop in enumerate(drops):
+            pairing = models[n].pairings[role]
+            pick, edge = matched(drop.matches[role])
+            # Any moment after the release: at rest, a chain has no uncertainty.
+            fallen = drop.x[at[f"{role} release"]] + 1.0
+            times[n] = pairing.times[edge].max() if edge.size else fallen
             times[n, pick], burst[n, pick] = pairing.times[edge], pairing.burst[edge]
         edges[role] = expected.seen(np.arange(expected.rods.size), times, burst)
     return edges
@@ -173,8 +268,8 @@ def _edges(models: Sequence[DropModel], matches: Sequence[Matches], x: Array) ->
 
 def joint_step(
     groups: Sequence[DropGroup], x: Array, cut: float = STRAY
-) -> tuple[Array, Root, list[Elimination]]:
-    """Eliminate the drops' own unknowns, and return the information on the shared ones.
+) -> tuple[Array, Root, list[DropGroup]]:
+    """Eliminate the drops' own unknowns.
 
     Parameters
     ----------
@@ -185,18 +280,15 @@ def joint_step(
 
     Returns
     -------
-    sd, root, reduced
+    sd, root, groups
         Prior uncertainties of the shared unknowns; the information on these, in units of `sd`; and
-        each group with its own unknowns eliminated.
+        the drops, with the step of their own unknowns.
     """
     sd, rows, reduced = np.zeros(x.size), list[EquationRows](), []
     for group in groups:
-        at = group.model.unknowns
-        sd[group.here] = at.sd[group.common]
-        blocks = [*linearize(group.model, group.edges, group.x, cut=cut).rows.values()]
-        part = eliminate(blocks, at.sd, at.pull(group.x), group.own, group.common)
-        slopes = part.rest.slopes.reshape(-1, group.here.size)
-        rows = condense([*rows, EquationRows(slopes, part.rest.left.ravel(), group.here)], x.size)
-        used = part.rest._replace(slopes=slopes[:0].copy(), left=slopes[:0, 0].copy())
-        reduced.append(part._replace(rest=used))  # without what is in `rows`
-    return sd, square_root(rows, np.ones(x.size), standardise(x, sd)), reduced
+        sd[group.places.here] = group.model.unknowns.sd[group.places.common]
+        part, rest = group.reduce(cut)
+        rows = condense([*rows, rest], x.size)
+        reduced.append(part)
+    root = square_root(rows, np.ones(x.size), standardise(x, sd))
+    return sd, root, reduced

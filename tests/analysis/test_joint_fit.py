@@ -35,9 +35,9 @@ class Whole:
         self.columns = []
         for drop in joint.drops:
             place = np.empty(drop.x.size, dtype=int)
-            place[drop.common] = drop.here
-            place[drop.own] = size + np.arange(drop.own.size)
-            size += drop.own.size
+            place[drop.places.common] = drop.places.here
+            place[drop.places.own] = size + np.arange(drop.places.own.size)
+            size += drop.places.own.size
             self.columns.append(place)
         self.data = np.zeros((size, size))
         self.vector = np.zeros(size)
@@ -100,9 +100,13 @@ def test_how_many_drops_are_fitted_at_once_changes_no_result(monkeypatch):
     together = fit_session(FOUR)
     monkeypatch.setattr("rig.analysis.joint_step._AT_ONCE", 1)
     each = joint_fit(fits(cases(FOUR)))
-    np.testing.assert_allclose(
-        *([drop.x for drop in fit.drops] for fit in (each, together)), atol=1e-9
-    )
+    for pair in zip(each.drops, together.drops, strict=True):
+        one, other = (
+            Budgets(fit).measure_all(drop) for fit, drop in zip((each, together), pair, strict=True)
+        )
+        for name, value in one.items():
+            assert value.value == pytest.approx(other[name].value, abs=1e-3 * value.u), name
+            assert value.u == pytest.approx(other[name].u, rel=1e-3), name
 
 
 def test_a_drop_without_any_edge_of_a_chain_harms_no_other():
