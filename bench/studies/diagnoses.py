@@ -120,7 +120,7 @@ class DiagnosisTally:
 def judged(fault: str, result: DropResult) -> str:
     """Return which of `OUTCOMES` the reasons of a drop with a fault are."""
     codes = {reason.code for reason in result.reasons}
-    accused = {rig.name for rig in WRONG_RIGS if rig.codes & codes}
+    accused = {rig.name for rig in WRONG_RIGS if rig.codes & codes} | ({"braked"} & codes)
     if accused == {fault}:
         return "right"
     if accused:

@@ -152,13 +152,9 @@ class DropCase:
         case = stated = self._at_contact()
         reading = stated._identify(readings)
         drop_fit = begun = stated._begin(reading)
-        tried = list[tuple[int, ...]]()
-        while True:
-            # Not identified with all gates, a drop says nothing about those that are left out.
-            counted = case if begun is None else stated
-            low = *counted.aside, *counted._too_low(drop_fit)
-            if low in tried:
-                break
+        tried, fit = list[tuple[int, ...]](), None
+        # Not identified with all gates, a drop says nothing about those that are left out.
+        while (low := (case if begun is None else stated)._too_low(drop_fit)) not in tried:
             tried.append(low)
             case = replace(stated, aside=low)
             if drop_fit is None or not low:
@@ -174,10 +170,10 @@ class DropCase:
         return stated._judge(reading, fit, readings, explain=explain)
 
     def _too_low(self, drop: DropFit | None) -> tuple[int, ...]:
-        """Return which of all gates are too low for a drop, fitted with any of them."""
+        """Return the gates that are left out or too low for a drop, fitted with any of them."""
         if drop is not None and any(record.aside for record in drop.model.records.values()):
             drop = DropFit(self._model(drop.model.alpha), {}, drop.x)
-        return gates_too_low(self.protocol, self.records, drop)
+        return *self.aside, *gates_too_low(self.protocol, self.records, drop)
 
     def _at_contact(self) -> DropCase:
         return replace(self, protocol=of_run(self.protocol, self.run))
@@ -255,7 +251,7 @@ class DropCase:
             return DropResult(run, drop.attempt, "void", reasons, audit), None
         by_passages = last_passages(fit)
         reasons = judge(fit, run, drop, audit, measured, by_passages, unmatched)
-        if explain if is_wrong(reasons) else verdict_of(reasons) != "void":
+        if explain or not is_wrong(reasons):
             explainer = self._explainer(self.scale, suspects(records, fit.matches))
             reasons = explainer.name_fault(fit, reasons)
         result = DropResult(

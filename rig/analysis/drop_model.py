@@ -60,6 +60,8 @@ class DropModel:
     ----------
     condition
         The same for drops that differ only in their edges.
+    directions
+        Directions of set-up faults, see `rig.analysis.explanations`, kept for the condition.
     owners
         Suffixes of the names of shared unknowns, by owner, if the drops of a joint fit come from
         different rigs: see `rig.results.together`.
@@ -89,9 +91,10 @@ class DropModel:
         }
         if "impact" in self.records:
             record, edges = self.records["impact"], self.expected["impact"]
-            self.discrepancy = Discrepancy.of(
+            self.discrepancy: Discrepancy = Discrepancy.of(
                 record, edges.rods, edges.levels, protocol, self._kappa
             )
+        self.directions: dict[object, Array] = {}
         self._seen: dict[str, tuple[Index, Seen]] = {}
         self.slopes = {role: side_slopes(self, role) for role in self.records}
 
@@ -203,18 +206,14 @@ class DropModel:
         x[at["drag"]] = values[:, annealing.DRAG].max() - self._kappa
         return x
 
-    def rate(self, x: Array) -> float:
-        """Return the factor from stamped times to true times."""
-        return 1.0 + float(self.unknowns.rate @ x)
+    def rate(self, x: Array) -> Array:
+        """Return the factor from stamped times to true times, shape ``(1,)`` or ``(drops, 1)``."""
+        rates: Array = 1.0 + (x @ self.unknowns.rate)[..., None]
+        return rates
 
     def kappa(self, x: Array) -> float:
         """Return κ of the first chain as a whole, 1/m."""
         return self._kappa + float(x[self.unknowns["drag"]][0])
-
-    def alphas(self, x: Array) -> Array:
-        """Return the mean α of the impacts of a drop, or of many."""
-        alphas: Array = x[..., self.unknowns["alpha"]]
-        return alphas
 
     def trajectory(self, role: str, x: Array) -> Trajectory:
         """Return the trajectory of one side for given unknowns, or those of many drops.
@@ -247,7 +246,8 @@ class DropModel:
 
     def all_levels(self, role: str, x: Array) -> Array:
         """Return the height of the reference point at every expected edge of a side, m."""
-        return _levels_at(self, role, x.tobytes(), x.shape)
+        levels: Array = self.expected[role].levels + x @ self.slopes[role].levels.T
+        return levels
 
     def _matched_edges(self, role: str, match: Seen | Index) -> Seen:
         """Collect the matched edges; cached, as a matching lasts for many steps of a fit."""
@@ -264,7 +264,7 @@ class DropModel:
     def residuals(self, role: str, x: Array, match: Seen | Index) -> Residuals:
         """Return the residuals of one side's matched edges, of one drop or of many."""
         seen = self._matched_edges(role, match)
-        times = seen.times * self._rates(x)
+        times = seen.times * self.rate(x)
         path = self.trajectory(role, x)
         height, speed = path.heights(times)
         values = height - self.all_levels(role, x)[..., seen.pick]
@@ -305,7 +305,7 @@ class DropModel:
         Derivatives are taken at the expected time of an edge, not at its stamp. Otherwise they
         would depend on the stamp's error, and bias the clock rate towards a slow clock.
         """
-        acts, seen, rate = self.slopes[role], self._matched_edges(role, match), self._rates(x)
+        acts, seen, rate = self.slopes[role], self._matched_edges(role, match), self.rate(x)
         stamped = self.residuals(role, x, match)
         late = np.zeros_like(stamped.values)
         near = (np.abs(stamped.values) <= STRAY * stamped.sigma) & (stamped.speed > 0.0)
@@ -326,11 +326,6 @@ class DropModel:
         residuals = stamped._replace(values=values, sigma=sigma, speed=speed)
         return Equations(residuals, carried, slopes, acts.columns)
 
-    def _rates(self, x: Array) -> Array:
-        """Return the factor from stamped times to true times, shape ``(1,)`` or ``(drops, 1)``."""
-        rates: Array = 1.0 + (x @ self.unknowns.rate)[..., None]
-        return rates
-
 
 def _next(places: tuple[Index, ...], step: int) -> tuple[Index, ...]:
     """Return the places of the edges beside those at some places."""
@@ -340,13 +335,6 @@ def _next(places: tuple[Index, ...], step: int) -> tuple[Index, ...]:
 @lru_cache(maxsize=_RECENT)
 def _path_at(model: DropModel, role: str, x: bytes, shape: tuple[int, ...]) -> Trajectory:
     return model._trajectory(role, np.frombuffer(x).reshape(shape))
-
-
-@lru_cache(maxsize=_RECENT)
-def _levels_at(model: DropModel, role: str, x: bytes, shape: tuple[int, ...]) -> Array:
-    moved = np.frombuffer(x).reshape(shape) @ model.slopes[role].levels.T
-    levels: Array = model.expected[role].levels + moved
-    return levels
 
 
 @lru_cache(maxsize=_RECENT)

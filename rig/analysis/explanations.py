@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +22,6 @@ import numpy as np
 from rig.analysis.annealing import LEAST, MISSED
 from rig.analysis.chain_records import ChainRecord, chain_records
 from rig.analysis.diagnoses import RIGHT
-from rig.analysis.drop_model import DropModel
 from rig.analysis.faults import Fault, Premise, Suspects, faults
 from rig.analysis.fit import Fit, approach, settle
 from rig.analysis.identify import (
@@ -126,7 +125,7 @@ class Explainer:
             return (*reasons,)
         causes = [cause for cause in self._explain(fit) if cause.whole or fit is None]
         # A fault found by score and by votes counts once.
-        ranked = [*{id(cause.fault): cause for cause in sorted(causes, key=_evidence)}.values()]
+        ranked = [*{cause.fault.kin: cause for cause in sorted(causes, key=_evidence)}.values()]
         ranked.sort(key=_evidence, reverse=True)
         neither = next(cause.evidence for cause in ranked if cause.fault is _NEITHER)
         if ranked[0].fault is _NEITHER or ranked[0].evidence < neither + CLEAR:
@@ -149,9 +148,10 @@ class Explainer:
         rods = any(self.suspects.rods.values()) or self.suspects.more
         return rods or self._suggests_fault(fit, self.stated)
 
-    def _suggests_fault(self, fit: Fit, premise: Premise) -> bool:
+    def _suggests_fault(self, fit: Fit, premise: Premise, named: Fault = _NEITHER) -> bool:
         """Whether the score test of a fitted drop favours a fault beyond those of its premise."""
-        return bool((self._score_odds(fit, premise) > CLEAR).any())
+        others = [fault for fault in self._faults[0] if fault.kin != named.kin]
+        return bool((self._score_odds(fit, premise, others) > CLEAR).any())
 
     def _explain(self, fit: Fit | None) -> Iterator[Explanation]:
         """Yield faults that may explain the drop, and the hypothesis that there is none."""
@@ -187,9 +187,8 @@ class Explainer:
     def _read_alone(self, record: ChainRecord) -> float:
         """Return the evidence of a side by itself, for a drop that was not identified."""
         reading = self._read(self.stated.protocol, [record])
-        if reading is None:
-            return record.edge_count * math.log(MISSED)
-        return self._evidence(reading, self.stated.hz)
+        none = record.edge_count * math.log(MISSED)
+        return none if reading is None else self._evidence(reading, self.stated.hz)
 
     def _read(self, protocol: Protocol, records: Sequence[ChainRecord]) -> Reading | None:
         """Return the best reading near the stated values; quicker than all of `identify`."""
@@ -197,24 +196,34 @@ class Explainer:
 
     def _along(self, fit: Fit) -> Iterator[Explanation]:
         """Yield fits of the continuous faults with the largest gain by the score test."""
-        gains = self._score_odds(fit, self.stated)
+        sized, _ = self._faults
+        gains = self._score_odds(fit, self.stated, sized)
         # For a good reading the score test excludes faults without gain. A fault may also remove
         # the penalty for negative drag.
         least = min(0.0, held_back(fit)) if well_read(fit) else -math.inf
-        for n in [int(n) for n in np.argsort(-gains) if gains[n] > least][:_TRIED]:
-            yield from self._fit_size(self._faults[0][n], 0.0, fit)
+        ranked = [sized[n] for n in np.argsort(gains) if gains[n] > least]
+        likely = {fault.kin: fault for fault in ranked}.values()  # the likeliest of its kin is last
+        for fault in sorted(likely, key=ranked.index, reverse=True)[:_TRIED]:
+            odds, alike = self._score_odds(fit, self.stated, fault.alike), fault.alike
+            for n in np.argsort(-odds)[:_NAMED].tolist():
+                yield from self._fit_size(alike[n], 0.0, fit)
 
-    def _score_odds(self, fit: Fit, premise: Premise) -> Array:
-        """Return the log odds of each continuous fault by its score, without its prior's cost."""
-        sized, _ = self._faults
-        asked = _Directions(fit.model.condition, sized, premise, fit.model)
+    def _score_odds(self, fit: Fit, premise: Premise, faults: Sequence[Fault]) -> Array:
+        """Return the log odds of continuous faults by their score, without their prior's cost."""
+        # With the stated protocol they are the same for all drops of a condition.
         is_stated = premise is self.stated and not fit.model.suspects
-        test = scores(fit, _stated_directions(asked) if is_stated else asked.vectors)
+        known, vectors = fit.model.directions if is_stated else {}, []
+        for key, fault in [((fault.code, repr(fault.where)), fault) for fault in faults]:
+            if key not in known:
+                known[key] = fault.direction(premise, fit.model)
+            vectors.append(known[key])
+        test = scores(fit, vectors, [fault.braked(fit) for fault in faults])
         # The Occam factor: ln of the prior range of a size over its posterior width.
         widths = math.sqrt(2.0 * math.pi) * test.u
-        spans = np.array([fault.span for fault in sized])
-        odds: Array = test.gain - np.log(np.maximum(1.0, spans / widths))
-        return odds
+        ranges = [(min(fault.sizes), max(fault.sizes), fault.cost(fit)) for fault in faults]
+        least, largest, cost = np.array(ranges).T
+        odds = test.gain - np.log(np.maximum(1.0, (largest - least) / widths)) - cost
+        return np.where((least == 0.0) & (test.size < 0.0), -np.inf, odds)
 
     def _evidence(self, reading: Reading, hz: float) -> float:
         """Return the evidence of a reading, comparable between premises.
@@ -240,7 +249,7 @@ class Explainer:
         """Yield fits of the faults with most votes, each at its best size; best first."""
         least = self._net(self.stated)[1]
         candidates = []
-        for fault in faults:
+        for fault in (fault for fault in faults if not fault.power):  # a brake changes no premise
             sized = [
                 (*self._net(fault.change(self.stated, size), least), size) for size in fault.sizes
             ]
@@ -300,18 +309,19 @@ class Explainer:
         fit
             Fit to begin with.
         """
-        premise, largest = fault.change(self.stated, size), max(fault.sizes)
-        direction = fault.direction(premise, fit.model)
-        score = scores(fit, [direction])
-        model = fit.model.copy_with(suspects=(fault.suspect(fit.model, direction),))
-        first = np.clip(score.size, -largest, largest) * np.append(score.follow, 1.0)
+        premise, brake = fault.change(self.stated, size), fault.braked(fit)
+        direction, sizes = fault.direction(premise, fit.model), fault.sizes
+        score = scores(fit, [direction], [brake])
+        model = fit.model.copy_with(suspects=(fault.suspect(fit.model, direction, brake),))
+        first = np.clip(score.size, min(sizes), max(sizes)) * np.append(score.follow, 1.0)
         reading = weigh(settle(approach(model, np.append(fit.x, 0.0) + first)))
         estimate = reading.fit.estimate
         further, u = float(estimate.x[-1]), float(estimate.own_u[-1])
-        if APART * u < abs(size + further) <= largest:
+        if APART * u < abs(size + further) and min(sizes) <= size + further <= max(sizes):
             # A smaller size may be zero, a larger size has another cause.
             premise = premise._replace(hz=premise.hz / (1.0 + model.unknowns.rate[-1] * further))
-            yield self._explanation(fault, fault.values(size + further, u), reading, premise)
+            values = fault.values(size + further, u) | ({"time_s": brake.time_s} if brake else {})
+            yield self._explanation(fault, values, reading, premise, fault.cost(fit))
 
     def _explanation(
         self,
@@ -322,28 +332,8 @@ class Explainer:
         occam: float = 0.0,
     ) -> Explanation:
         evidence = self._evidence(reading, premise.hz) - CLEAR - occam
-        complete = well_read(reading.fit) and not self._suggests_fault(reading.fit, premise)
+        complete = well_read(reading.fit) and not self._suggests_fault(reading.fit, premise, fault)
         return Explanation(fault, values, evidence, complete)
-
-
-@dataclass(frozen=True)
-class _Directions:
-    """Cache key: continuous faults have the same directions in all drops of a condition."""
-
-    condition: object
-    faults: Sequence[Fault] = field(compare=False)
-    premise: Premise = field(compare=False)
-    model: DropModel = field(compare=False)
-
-    @property
-    def vectors(self) -> list[Array]:
-        """Direction of each fault, see `Fault.direction`."""
-        return [fault.direction(self.premise, self.model) for fault in self.faults]
-
-
-@lru_cache(maxsize=32)
-def _stated_directions(asked: _Directions) -> list[Array]:
-    return asked.vectors
 
 
 def _evidence(cause: Explanation) -> float:

@@ -9,18 +9,26 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
+from functools import lru_cache
+from itertools import combinations, product
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from rig.analysis.drop_model import DropModel
+from rig.analysis.fit import DropFit, count_matched
 from rig.analysis.unknowns import Unknown
 from rig.arrays import Array
 from rig.protocol.protocol import Gate, Protocol, RodChain, Run
 
 _MORE = 3  # rods by which a chain may differ
 _WIDER = 0.5  # share of the thinnest rod by which rods may differ in thickness
+_BEHIND = 0.1  # m by which a braked chain may be behind at its last edge
+_UNTOLD = 0.5
+"""Departures of a chain that no fault explains, in units of its edges' scatter."""
+_MOMENTS = 12
+_FINER = 16
+"""Parts of a fall at whose ends a chain may be braked, and parts of one of these."""
 
 
 class Premise(NamedTuple):
@@ -68,6 +76,11 @@ class Fault:
         Number of sizes that are equally likely beforehand, if it is not that of `sizes`.
     continuous
         Whether the size is fitted. The premise then changes in proportion to it.
+    moment, power
+        Share of the time from the first to the last edge of its side after which a chain is braked
+        (a brake before them is a late release of a chain that hangs elsewhere), and the power of
+        the time since with which it falls behind: 1 after a jerk, 2 while something rubs. 0 for any
+        other fault.
     """
 
     code: str
@@ -77,6 +90,19 @@ class Fault:
     sizes: tuple[float, ...] = (0.0,)
     ways: int = 0
     continuous: bool = False
+    moment: float = 0.0
+    power: int = 0
+
+    @property
+    def kin(self) -> object:
+        """The same for brakes of a side, of which only the likeliest counts."""
+        return self.where["side"] if self.power else id(self)
+
+    @property
+    def alike(self) -> list[Fault]:
+        """The fault, and if it is a brake those at moments between the ones next to it."""
+        finer = np.arange(1 - _FINER, _FINER) / (_FINER * _MOMENTS) if self.power else np.zeros(1)
+        return [replace(self, moment=self.moment + later) for later in finer.tolist()]
 
     def values(self, size: float, u: float) -> dict[str, Any]:
         """Return the values of the reason that names the fault; `u` is 0 for a count."""
@@ -84,10 +110,24 @@ class Fault:
         sizes |= {"U95_m" if self.size == "size_m" else "U95": 2.0 * u} if u else {}
         return {**self.where, **sizes}
 
-    @property
-    def span(self) -> float:
-        """Range of a continuous size."""
-        return max(self.sizes) - min(self.sizes)
+    def cost(self, fit: DropFit) -> float:
+        """Return the log odds that a continuous fault must make up for, beside its prior's.
+
+        Of many moments one is chosen. And without a brake, too, a chain may depart from its fitted
+        fall by a part of its edges' scatter.
+        """
+        edges = count_matched(fit.matches[self.where["side"]]) if self.power else 0
+        return math.log(self.ways or 1) + 0.5 * _UNTOLD**2 * edges
+
+    def braked(self, fit: DropFit) -> Braked | None:
+        """Return what a brake does to a drop's edges; `None` for any other fault."""
+        if not self.power:
+            return None
+        times, speeds = _passages(fit, self.where["side"])
+        first, last = times.min(initial=np.inf), times.max(initial=-np.inf)
+        moment = first + self.moment * (last - first)
+        behind = (np.maximum(times - moment, 0.0) / (last - moment)) ** self.power
+        return Braked(self.where["side"], float(moment), behind, behind / speeds)
 
     def direction(self, stated: Premise, model: DropModel) -> Array:
         """Return the change of a drop's unknowns by a fault of size 1, shape ``(unknowns,)``."""
@@ -105,21 +145,52 @@ class Fault:
             moved[at[f"{role} width"]] = chain.widths[0] - other.widths[0]
         return moved
 
-    def suspect(self, model: DropModel, direction: Array) -> Unknown:
+    def suspect(self, model: DropModel, direction: Array, braked: Braked | None) -> Unknown:
         """Return the size as a further unknown, with a normal prior for the range of sizes.
 
         The prior's density at its mean is that of a uniform distribution over the range, whose
         width is √(2π) standard deviations.
         """
+        behind = {braked.side: braked.behind} if braked else {}
         return Unknown(
             "fault",
             "edges",
-            lambda _side: self.span / math.sqrt(2.0 * math.pi),
+            lambda _side: float(np.ptp(self.sizes)) / math.sqrt(2.0 * math.pi),
             moves="all",
             path=lambda side: (model.slopes[side.record.role].path @ direction)[:, None],
-            level=lambda side: model.slopes[side.record.role].levels @ direction,
+            level=lambda side: (
+                model.slopes[side.record.role].levels @ direction
+                - behind.get(side.record.role, 0.0)
+            ),
             rate=float(model.unknowns.rate @ direction),
         )
+
+
+class Braked(NamedTuple):
+    """A chain that loses speed at some moment, and is 1 m behind at its last edge.
+
+    Attributes
+    ----------
+    side
+        Its side.
+    time_s
+        The moment, s after its release.
+    behind, late
+        How far behind and how late it is at each expected edge, m and s.
+    """
+
+    side: str
+    time_s: float
+    behind: Array
+    late: Array
+
+
+@lru_cache(maxsize=2)  # all brakes of a drop ask for the same
+def _passages(fit: DropFit, role: str) -> tuple[Array, Array]:
+    """Return when each expected edge comes, s after the release, and the speed then."""
+    path = fit.model.trajectory(role, fit.x)
+    times, speeds = path.passages(fit.model.all_levels(role, fit.x))
+    return times - float(path.time[0]), np.maximum(speeds, np.finfo(float).tiny)
 
 
 class Suspects(NamedTuple):
@@ -149,6 +220,8 @@ def faults(stated: Premise, suspects: Suspects) -> Iterator[Fault]:
     for side, chain in hung.items():
         yield from _size_faults([chain], chain.name)
         yield from _order_faults(chain, side, suspects.rods.get(chain.name, ()))
+        if chain.chain.rods > 1:
+            yield from _brakes(side)
     if len(hung) > 1:
         yield from _size_faults([*hung.values()])
         if protocol.unlike_chains:
@@ -193,6 +266,20 @@ def _order_faults(chain: RodChain, side: str, absent: Sequence[int]) -> Iterator
     if numbers := tuple(rod + 1 for rod in absent if 0 < rod < count - 1):
         gap = _of_rods([chain.name], lambda rods, n: [*rods[: round(n) - 1], *rods[round(n) :]])
         yield Fault("rod_missing", gap, where | {"rods": count}, "rod", numbers, ways=count)
+
+
+def _brakes(side: str) -> Iterator[Fault]:
+    """Yield a side's chain braked at each moment, in either way."""
+    braked = Fault(
+        "braked",
+        lambda stated, _: stated,
+        {"side": side},
+        "size_m",
+        (0.0, _BEHIND),
+        continuous=True,
+    )
+    for part, power in product(range(1, _MOMENTS), (1, 2)):
+        yield replace(braked, ways=2 * (_MOMENTS - 1), moment=part / _MOMENTS, power=power)
 
 
 def _rig_faults(stated: Premise) -> Iterator[Fault]:

@@ -72,20 +72,14 @@ class DropFit:
             for role, match in self.matches.items()
         }
 
-    @property
-    def rods(self) -> dict[int, int]:
-        """Rod of every matched edge, by its number in the drop."""
-        rods: dict[int, int] = {}
+    def rods_of(self, edges: int) -> tuple[int, ...]:
+        """Return the rod of each of the drop's edges, −1 if it belongs to none."""
+        rods = np.full(edges, -1)
         for role, record in self.model.records.items():
             for train, _, match in record.by_gate(self.matches[role]):
                 pick, edge = matched(match)
-                rods |= zip(train.edge[edge].tolist(), train.rods[pick].tolist(), strict=True)
-        return rods
-
-    def rods_of(self, edges: int) -> tuple[int, ...]:
-        """Return the rod of each of the drop's edges, −1 if it belongs to none."""
-        rods = self.rods
-        return tuple(rods.get(n, -1) for n in range(edges))
+                rods[train.edge[edge]] = train.rods[pick]
+        return tuple(rods.tolist())
 
 
 @dataclass(frozen=True, slots=True, eq=False)

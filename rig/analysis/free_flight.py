@@ -27,14 +27,6 @@ def _rate(gravity: float | Array, kappa: float | Array) -> float | Array:
     return rate
 
 
-def _is_faint(kappa: float | Array) -> bool:
-    return bool(np.all(np.abs(kappa) < FAINT))
-
-
-def _is_positive(kappa: float | Array) -> bool:
-    return bool(np.all(kappa > 0.0))
-
-
 def fall_for(
     since: Array, speed: Array, gravity: float | Array, kappa: float | Array
 ) -> tuple[Array, Array, Array]:
@@ -45,7 +37,7 @@ def fall_for(
     """
     rate = _rate(gravity, kappa)
     # Clip for edges long after the fall: sinh must not overflow, nor the sine repeat.
-    sinus, largest = (np.sinh, 300.0) if _is_positive(kappa) else (np.sin, 1.2)
+    sinus, largest = (np.sinh, 300.0) if np.all(kappa > 0.0) else (np.sin, 1.2)
     half = sinus(np.minimum((0.5 * rate) * since, largest)) / rate
     square = gravity * half * half
     sine = 2.0 * half * np.sqrt(1.0 + kappa * square)
@@ -71,7 +63,7 @@ def fall_slopes(
     fallen, end, by_speed = fall
     slower = speed * by_speed
     by_gravity = (since * end - slower) / (2.0 * gravity)
-    if _is_faint(kappa):  # −∫∫v² of a ballistic leg
+    if np.all(np.abs(kappa) < FAINT):  # −∫∫v² of a ballistic leg
         half = 0.5 * speed * speed + (speed * gravity / 3.0 + gravity**2 * since / 12.0) * since
         return by_gravity, -half * since * since
     return by_gravity, (slower + gravity * by_gravity - fallen) / kappa
@@ -86,7 +78,7 @@ def reach_of(distance: Array, kappa: float | Array) -> Array:
 def reach_slopes(distance: Array, reach: Array, kappa: float | Array) -> Array:
     """Return the derivative of `reach_of` by κ."""
     y = 2.0 * kappa * distance
-    if _is_faint(kappa):
+    if np.all(np.abs(kappa) < FAINT):
         return np.asarray(-4.0 * distance**2 * (0.5 - y / 3.0 + y * y / 8.0))
     return np.asarray((2.0 * distance * np.exp(-y) - reach) / kappa)
 
@@ -96,7 +88,7 @@ def speed_slope(
 ) -> Array:
     """Return ∂z/∂v of a leg of duration t and distance z: S(t) e^(−κz), see `fall_for`."""
     rate = _rate(gravity, kappa)
-    sinus = np.sinh if _is_positive(kappa) else np.sin
+    sinus = np.sinh if np.all(kappa > 0.0) else np.sin
     return np.asarray(sinus(rate * since) / rate * np.exp(-kappa * distance))
 
 
@@ -107,7 +99,7 @@ def lasting(
     rate = _rate(gravity, kappa)
     begin = arrival + (1.0 - kappa * reach) * speed
     slow = rate * reach / np.maximum(begin, np.finfo(float).tiny)
-    if not _is_positive(kappa):
+    if not np.all(kappa > 0.0):
         return np.asarray(np.arctan(slow) / rate)
     never = 1.0 - np.finfo(float).eps  # arctanh must stay finite
     return np.asarray(np.arctanh(np.clip(slow, -never, never)) / rate)

@@ -28,7 +28,7 @@ def other_incline(fit: Fit, run: Run) -> Iterator[Reason]:
     model, stated, surface = fit.model, run.incline_deg, fit.model.protocol.surface
     if surface is None or stated is None or "alpha" not in model.unknowns:
         return
-    alpha = float(model.alphas(fit.x)[0])
+    alpha = float(fit.x[model.unknowns["alpha"]][0])
     u = float(fit.estimate.own_u[model.unknowns["alpha"]][0])
     likely: dict[float, tuple[float, float]] = {}  # ln p of α, and its deviation in units of sd
     for angle in (stated, *model.protocol.plan.inclines):

@@ -17,12 +17,12 @@ from typing import Any
 
 import numpy as np
 
+from rig.analysis.adjust import length
 from rig.analysis.components import Components, priors
 from rig.analysis.equations import STRAY, Residuals, standardise
 from rig.analysis.evidence import Evidence
 from rig.analysis.fit import DropFit, Fit
 from rig.analysis.joint_step import (
-    DropAlone,
     DropGroup,
     JointDrop,
     Places,
@@ -34,7 +34,7 @@ from rig.analysis.likeness import Likeness, likeness
 from rig.analysis.result import Measured
 from rig.analysis.unknowns import SharedUnknowns
 from rig.arrays import Array
-from rig.plain_data import Record, attributes
+from rig.plain_data import Record
 from rig.protocol.protocol import GUESSED
 from rig.threads import one_thread
 
@@ -43,10 +43,10 @@ FEWEST = 4
 IDENTIFIED = 0.5
 """Least relative reduction of the prior variance for an unknown to count as identified."""
 _ROUNDS = 60  # few drops need many rounds, as they determine the scatter poorly
-_REMATCH = 2
-"""Rounds after which all edges are matched again with improved beams and rods; from then on,
-alternating steps are damped."""
-_DONE = 0.02  # last step, in standard uncertainties, and last relative change of the components
+_FIRST = 1  # rounds until shared and own unknowns fit together
+_DONE = 0.02
+"""Last step in standard uncertainties, root mean square over independent sums of shared unknowns,
+and last relative change of the components."""
 _SHORTEST = 1e-6  # least share of a step before the fit fails
 _LEAST = {"floor": 5e-6, "departure": 5e-6, "few": 5e-6}
 """Components, m, below which others of the same variance dominate."""
@@ -132,8 +132,7 @@ class JointFit:
             determine them.
         """
         variance = np.diag(self.covariance)
-        beforehand = attributes(priors(self.drops[0].model.protocol), *self.degrees)
-        scatter = attributes(self.components, *self.degrees)
+        stated, found = priors(self.drops[0].model.protocol), self.components
         columns = {
             "value": self.x,
             "u": np.sqrt(variance) * self.sd,
@@ -143,10 +142,8 @@ class JointFit:
         return {
             "runs": len(self.drops),
             "scatter": [
-                {"name": name, "stated": prior, "found": scatter[name], "degrees": degrees}
-                for (name, degrees), prior in zip(
-                    self.degrees.items(), beforehand.values(), strict=True
-                )
+                {"name": n, "stated": getattr(stated, n), "found": getattr(found, n), "degrees": nu}
+                for n, nu in self.degrees.items()
             ],
             "unknowns": [
                 {"name": name} | {key: values[block].tolist() for key, values in columns.items()}
@@ -161,7 +158,7 @@ def by_itself(fit: Fit) -> JointFit:
     shared, x = SharedUnknowns(()), np.zeros(0)
     none = np.zeros(0, dtype=np.intp)
     places = Places(np.arange(fit.x.size), none, none)
-    drop = DropAlone(fit.model, fit.matches, fit.x, places, fit.matches, fit.estimate)
+    drop = JointDrop(fit.model, fit.matches, fit.x, places, fit.matches, fit.estimate)
     degrees = {"jitter": fit.estimate.degrees, "impulse": GUESSED}
     components, settled = fit.model.components, fit.estimate.settled
     return JointFit(shared, x, x, np.zeros((0, 0)), components, degrees, (drop,), settled)
@@ -177,40 +174,37 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
         Good drops, each fitted by itself or in an earlier joint fit.
     """
     shared, groups = group_drops(fits)
-    x, beforehand = _average(groups, len(shared)), priors(fits[0].model.protocol)
+    x, beforehand = np.zeros(len(shared)), priors(fits[0].model.protocol)
     evidence = Evidence(beforehand, beforehand)
     settled, moved, size, before = False, 0.0, len(shared), evidence.components
     previous = np.zeros(size + len(before.__slots__))
-    damping = np.ones_like(previous)
+    damping, inverse = np.ones_like(previous), np.eye(size)
     for round_ in range(_ROUNDS):
         groups = with_priors([group.at(x) for group in groups], evidence.components)
-        if round_ == _REMATCH:
-            groups = [group.rematch() for group in groups]
         # In the first round shared and own unknowns do not fit together yet: cut no residuals.
         cut = STRAY if round_ else math.inf
         sd, root, groups = joint_step(groups, x, cut)
         step = damping[:size] * root.step()
         moves = _move(groups, x, sd, step) if np.isfinite(step).all() else None
         if moves is None:
-            return JointFit(
-                shared, x, sd, np.eye(size), before, evidence.degrees, (), settled=False
-            )
+            settled, groups = False, []
+            break
         x, groups, residuals = moves
         inverse = np.linalg.inv(root.matrix).astype(np.float64, copy=False)
-        last, moved = moved, float(np.abs(step / np.linalg.norm(inverse, axis=1)).max())
+        last, moved = moved, length(step, root.matrix) / math.sqrt(size)
         before = evidence.components
         evidence = Evidence(before, beforehand)
         evidence.edges(residuals)
         _weigh(evidence, shared, x, sd, inverse, groups)
         # With linear convergence, the next step is shorter by the ratio of the last two.
-        settled = round_ > _REMATCH and (moved < _DONE or moved**2 < _DONE * last)
+        settled = round_ > _FIRST and (moved < _DONE or moved**2 < _DONE * last)
         if settled and _steady(before, evidence.components, groups):
             break
         # Halve steps that alternate, as they do next to a lower bound of a component.
         ratios = damping[size:] * before.ratios(evidence.components)
         evidence.components = before.times(ratios)
         ahead = np.concatenate([step, ratios])
-        if round_ > _REMATCH:
+        if round_ > _FIRST:
             damping[ahead * previous < 0.0] *= 0.5
         previous = ahead
     gains = defaultdict[str, Array](partial(np.zeros, (size, size)))
@@ -248,15 +242,6 @@ def _move(
     return None
 
 
-def _average(groups: Sequence[DropGroup], size: int) -> Array:
-    """Return the mean of the drops' own estimates of each shared unknown."""
-    total, count = np.zeros(size), np.zeros(size)
-    for group in groups:
-        total[group.places.here] += group.x[:, group.places.common].sum(axis=0)
-        count[group.places.here] += len(group.x)
-    return total / count
-
-
 def _weigh(
     evidence: Evidence,
     shared: SharedUnknowns,
@@ -291,7 +276,7 @@ def _steady(old: Components, new: Components, groups: Sequence[DropGroup]) -> bo
     For impulses the scatter at the drops' α is compared. If all have about the same α, the edges
     do not separate its components, and no result depends on them.
     """
-    names = [name for name in old.__slots__ if name not in ("impulse", "impulse_floor", "bounce")]
+    names = {*old.__slots__} - {"impulse", "impulse_floor", "bounce"}
     pairs = [(getattr(old, name), getattr(new, name), _LEAST.get(name, 0.0)) for name in names]
     alphas = {abs(group.model.alpha) for group in groups if "impact" in group.model.records}
     ends = np.array([1.0, math.inf])

@@ -17,7 +17,7 @@ from rig.analysis.annealing import matched
 from rig.analysis.components import Components
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY, Seen, linearize, standardise
-from rig.analysis.fit import DropFit, Matches, match, without_strays
+from rig.analysis.fit import DropFit, Matches, without_strays
 from rig.analysis.square_root import (
     Elimination,
     EquationRows,
@@ -57,13 +57,18 @@ class JointDrop(DropFit):
         Places of its unknowns.
     fitted
         Matches of the fit: `matches` and strays.
+    estimate
+        Result of its own fit, if it shares nothing with others.
     """
 
     places: Places
     fitted: Matches
+    estimate: Estimate | None = None
 
     def solve(self) -> tuple[Array, Array]:
         """Return R⁻¹ and gain of its own unknowns, as in `rig.analysis.square_root.Elimination`."""
+        if self.estimate is not None:
+            return self.estimate.inverse, np.zeros((self.x.size, 0))
         return _solve(self)
 
 
@@ -72,23 +77,6 @@ def _solve(drop: JointDrop) -> tuple[Array, Array]:
     # What a model prepares of its edges goes with the copy.
     model = drop.model.with_edges(drop.model.records)
     return _eliminate(model, drop.fitted, drop.x, drop.places)[:2]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class DropAlone(JointDrop):
-    """A drop that shares nothing with others.
-
-    Attributes
-    ----------
-    estimate
-        Result of its own fit.
-    """
-
-    estimate: Estimate
-
-    def solve(self) -> tuple[Array, Array]:
-        """Return R⁻¹ of its fit."""
-        return self.estimate.inverse, np.zeros((self.x.size, 0))
 
 
 def _eliminate(
@@ -191,14 +179,6 @@ class DropGroup:
         for _, row, inside in self._own_blocks():
             gains[row.line][inner] += len(self.drops) * self.gain[inside].T @ self.gain[inside]
 
-    def rematch(self) -> DropGroup:
-        """Return the drops with their edges matched anew."""
-        drops = [
-            DropFit(drop.model, match(self.model.with_edges(drop.model.records), x), x)
-            for drop, x in zip(self.drops, self.x, strict=True)
-        ]
-        return replace(self, drops=drops, edges=_edges(self.model, drops))
-
     def split(self) -> Iterator[tuple[int, JointDrop]]:
         """Yield each drop with its number, without strays."""
         for n, drop, x in zip(self.numbers, self.drops, self.x, strict=True):
@@ -238,14 +218,14 @@ def with_priors(groups: Sequence[DropGroup], components: Components) -> list[Dro
     alphas: dict[object, list[Array]] = {}
     for group in groups:
         if "impact" in group.model.records:
-            alphas.setdefault(group.model.condition, []).append(group.model.alphas(group.x))
+            places = group.model.unknowns["alpha"]
+            alphas.setdefault(group.model.condition, []).append(group.x[:, places])
+    mean = {condition: float(np.concatenate(each).mean()) for condition, each in alphas.items()}
     changed = []
     for group in groups:
-        of_condition = alphas.get(group.model.condition)
-        alpha = float(np.concatenate(of_condition).mean()) if of_condition else 0.0
-        changed.append(
-            replace(group, model=group.model.copy_with(components=components, alpha=alpha))
-        )
+        alpha = mean.get(group.model.condition, 0.0)
+        model = group.model.copy_with(components=components, alpha=alpha)
+        changed.append(replace(group, model=model))
     return changed
 
 

@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from rig.analysis.annealing import matched
+from rig.analysis.faults import Braked
 from rig.analysis.fit import Fit
 from rig.arrays import Array
 
@@ -37,7 +39,9 @@ class Scores(NamedTuple):
     follow: Array
 
 
-def scores(fit: Fit, directions: Sequence[Array]) -> Scores:
+def scores(
+    fit: Fit, directions: Sequence[Array], brakes: Sequence[Braked | None] = (None,)
+) -> Scores:
     """Return the score test of each direction, as a shift without a prior.
 
     With J the derivatives of the observations at the estimate, r the residuals, both in standard
@@ -48,15 +52,22 @@ def scores(fit: Fit, directions: Sequence[Array]) -> Scores:
     ----------
     directions
         Directions of the unknowns, shape ``(unknowns,)`` each.
+    brakes
+        What each direction does in addition.
     """
     estimate, along = fit.estimate, np.reshape(directions, (-1, fit.x.size)).T
-    rows = estimate.rows.values()
-    jacobian = np.zeros((sum(side.left.size for side in rows), fit.x.size))
-    begin = 0
-    for side in rows:
-        begin, first = begin + side.left.size, begin
-        jacobian[first:begin, side.columns] = side.slopes
-    left, moved = np.concatenate([side.left for side in rows]), jacobian @ along
+    blocks, moves = [], []
+    for role, side in estimate.rows.items():
+        block = np.zeros((side.left.size, fit.x.size))
+        block[:, side.columns] = side.slopes
+        moves.append(block @ along)
+        late = {n: brake.late for n, brake in enumerate(brakes) if brake and brake.side == role}
+        if late:  # a brake acts as if the release had been later for each edge
+            pick, release = matched(fit.matches[role])[0], fit.model.unknowns[f"{role} release"]
+            moves[-1][:, [*late]] += block[:, release] * np.stack([*late.values()], axis=1)[pick]
+        blocks.append(block)
+    jacobian, moved = np.concatenate(blocks), np.concatenate(moves)
+    left = np.concatenate([side.left for side in estimate.rows.values()])
     jacobian *= estimate.sd
     follow = -estimate.inverse @ (estimate.inverse.T @ (jacobian.T @ moved))
     # Information left by the other unknowns and priors, without a difference of large numbers.

@@ -229,14 +229,9 @@ class Trajectory:
 
     def _last_before(self, begins: Array, moments: Array) -> Index:
         """Return the last leg that has begun, as a flat index over all falls' legs."""
-        if begins.ndim == 1:
-            return np.maximum(np.searchsorted(begins, moments, side="right") - 1, 0)
-        count, size = begins.shape
-        moments_of = np.broadcast_to(moments, (count, moments.shape[-1]))
-        legs = np.zeros(moments_of.shape, dtype=np.intp)
-        for row, (begin, moment) in enumerate(zip(begins, moments_of, strict=True)):
-            last = np.searchsorted(begin, moment, side="right") - 1
-            legs[row] = size * row + np.maximum(last, 0)
+        begun = (begins[..., None, :] <= np.asarray(moments)[..., None]).sum(axis=-1)
+        first = begins.shape[-1] * np.arange(begins.size // begins.shape[-1])
+        legs: Index = np.maximum(begun - 1, 0) + (first[:, None] if begins.ndim > 1 else 0)
         return legs
 
     @property

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import groupby
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
 import numpy as np
 
@@ -25,11 +25,13 @@ from rig.analysis.trajectory import COMMON, DRAG, GRAVITY, RELEASE, START
 from rig.arrays import Array, Flags, Index
 from rig.predictions import air_of
 from rig.protocol.protocol import Gates, Protocol
+from rig.text_rows import read_rows
 
 if TYPE_CHECKING:
     from rig.analysis.drop_model import DropModel
 
     Effect = Callable[["Side"], Array]
+    Prior = Callable[["Side"], float | Sequence[float] | Array | None]
 
 ANY_GRAVITY = 5.0
 """Prior standard uncertainty of gravity where it is the measurand, m/s²."""
@@ -60,6 +62,12 @@ class Side(NamedTuple):
     def rods(self) -> int:
         """Number of rods of the chain."""
         return self.record.chain.chain.rods
+
+    @property
+    def top(self) -> Array:
+        """1 for the top rod, 0 for all others."""
+        top: Array = np.eye(self.rods)[-1]
+        return top
 
     @property
     def alpha(self) -> float:
@@ -113,7 +121,7 @@ class Unknown:
 
     name: str
     line: str
-    sd: Callable[[Side], float | Sequence[float] | Array | None]
+    sd: Prior
     of: Literal["all", "each", "impact", "free"] = "all"
     shared: Literal["rig", "air", "posts", "beams", "start", "chain", "condition", "drop"] = "drop"
     moves: str = ""
@@ -248,182 +256,97 @@ def _strike_sd(side: Side) -> float:
     return max([float(strike_u(side.record, side.protocol)[-1]), *lying])
 
 
-def _contact(side: Side) -> Array:
-    """Derivatives by the contact level; 0 for the top rod, as results refer to that level."""
-    return np.append(-np.ones(side.rods - 1), 0.0)[:, None]
+def _off_centre_sd(side: Side) -> float | None:
+    return side.protocol.priors.off_centre * side.slope if side.steepest else None
 
 
-def _top(side: Side) -> Array:
-    return np.append(np.zeros(side.rods - 1), 1.0)[:, None]
+def _early_sd(side: Side) -> float:
+    """Prior of what edges of a rod that may have struck before have in common."""
+    return math.sqrt(SHARED) * side.model.components.landed
 
 
-def _all(_: Side) -> float:
-    return 1.0
+PRIORS: dict[str, Prior] = {
+    "clock": lambda side: side.model.clock_u,
+    "gravity": lambda side: None if side.protocol.surface is None else side.protocol.gravity.u,
+    "gravity*": lambda side: ANY_GRAVITY if side.protocol.surface is None else None,
+    "drop": lambda side: side.protocol.drop.u,
+    "side": lambda side: side.protocol.priors.side if len(side.model.records) > 1 else None,
+    "drag": lambda side: side.model.kappa_u,
+    "air": _unlike_air_sd,
+    "air lag": _lag_sd,
+    "slack": _slack_sd,
+    "free usual slack": _slack_sd,
+    "datum": lambda side: [side.gates.datum_u] * len(side.gates.posts),
+    "beams": lambda side: [side.gates.height_u] * len(side.gates.gates),
+    "ripple": _ripple_sd,
+    "release": lambda _: math.inf,
+    "hang": lambda _: 1.0,
+    "rods": lambda side: [side.record.chain.position_u] * side.rods,
+    "off centre": _off_centre_sd,
+    "width": lambda side: side.record.chain.width_u,
+    "swing": _swing_sd,
+    "alpha": lambda _: math.inf,
+    "impulses": _impulse_sd,
+    "contact": lambda side: side.protocol.contact.level.u,
+    "strike": _strike_sd,
+    "top": _top_sd,
+    "turned": _turned_sd,
+    "landed": _early_sd,
+    "lying": _early_sd,
+    "strings": lambda side: side.protocol.priors.strings * abs(side.record.alpha),
+    "stretch": _stretch_sd,
+    "usual stretch": _stretch_sd,
+    "late": _late_sd,
+}
+PATHS: dict[str, Effect] = {
+    "air": lambda side: 1.0 / side.record.air[:1],
+    "rods": lambda side: np.eye(side.rods),
+    "swing": _swung,
+    "impulses": lambda side: np.eye(side.rods),
+    "contact": lambda side: side.top[:, None] - 1.0,  # results refer to the top rod's level
+    "top": lambda side: side.top[:, None],
+    "strings": lambda side: above(side.record.chain.chain)[:, None] ** -2.0,
+}
+LEVELS: dict[str, Effect] = {
+    "air lag": _lag,
+    "slack": _slack,
+    "free usual slack": _slack,
+    "datum": _by_post,
+    "beams": _by_gate,
+    "ripple": _beam_ripple,
+    "rods": lambda side: -np.eye(side.rods)[side.edges.rods],
+    "off centre": lambda side: -side.edges.turn,
+    "width": lambda side: -side.edges.sign,
+    "swing": lambda side: side.edges.drawn,
+    "top": lambda side: -side.edges.alone.astype(np.float64),
+    "turned": lambda side: -side.edges.sign * side.edges.alone,
+    "landed": lambda side: -side.edges.landed * side.edges.alone,
+    "lying": lambda side: -side.edges.landed * ~side.edges.alone,
+    "stretch": lambda side: side.model.discrepancy.stretch,
+    "usual stretch": lambda side: side.model.discrepancy.stretch,
+}
+ABSENT: dict[str, Callable[[Side], float | Array]] = {
+    "drag": lambda side: float(side.protocol.drag is None),
+    "impulses": _bounces,
+}
 
-
-_rig = partial(Unknown, shared="rig")
-_beams = partial(Unknown, shared="beams")
-_chain = partial(Unknown, of="each")
-_struck = partial(Unknown, of="impact")
-_early = partial(
-    _struck, line="contact", sd=lambda side: math.sqrt(SHARED) * side.model.components.landed
-)
-_stretch = partial(
-    _struck,
-    line="stretch",
-    sd=_stretch_sd,
-    level=lambda side: side.model.discrepancy.stretch,
-    scale="stretch",
-    absent=_all,
-)
-
-TABLE = (
-    _rig("clock", "clock", lambda side: side.model.clock_u, rate=1.0),
-    _rig(
-        "gravity",
-        "gravity",
-        lambda side: None if side.protocol.surface is None else side.protocol.gravity.u,
-        shared="air",
-        moves="gravity",
-    ),
-    Unknown(  # Where gravity is the measurand, each drop has its own value.
-        "gravity",
-        "gravity",
-        lambda side: ANY_GRAVITY if side.protocol.surface is None else None,
-        moves="gravity",
-    ),
+TABLE = tuple(
     Unknown(
-        "drop", "drop height", lambda side: side.protocol.drop.u, shared="start", moves="start"
-    ),
-    _rig(
-        "side",
-        "side",
-        lambda side: side.protocol.priors.side if len(side.model.records) > 1 else None,
-        of="free",
-        moves="start",
-    ),
-    _rig(
-        "drag",
-        "air",
-        lambda side: side.model.kappa_u,
-        shared="air",
-        moves="drag",
-        absent=lambda side: float(side.protocol.drag is None),
-    ),
-    _chain(
-        "air",
-        "air",
-        _unlike_air_sd,
-        shared="chain",
-        moves="drag",
-        path=lambda side: 1.0 / side.record.air[:1],
-        absent=_all,
-    ),
-    _rig("air lag", "air", _lag_sd, of="each", level=_lag, absent=_all),
-    _chain("slack", "air", _slack_sd, level=_slack, absent=_all),
-    Unknown(
-        "free usual slack", "air", _slack_sd, of="free", shared="chain", level=_slack, absent=_all
-    ),
-    Unknown(
-        "datum",
-        "datum",
-        lambda side: [side.gates.datum_u] * len(side.gates.posts),
-        shared="posts",
-        level=_by_post,
-    ),
-    _beams(
-        "beams",
-        "beam heights",
-        lambda side: [side.gates.height_u] * len(side.gates.gates),
-        level=_by_gate,
-        scale="gates",
-    ),
-    _beams("ripple", "beam offsets", _ripple_sd, level=_beam_ripple, scale="beam"),
-    _chain(  # Only edges determine the release, so its uncertainty belongs to their line.
-        "release", "edges", lambda _: math.inf, moves="release"
-    ),
-    _chain("hang", "start height", _all, moves="start", scale="hang"),
-    _chain(
-        "rods",
-        "spacing",
-        lambda side: [side.record.chain.position_u] * side.rods,
-        shared="chain",
-        moves="places",
-        path=lambda side: np.eye(side.rods),
-        level=lambda side: -np.eye(side.rods)[side.edges.rods],
-        scale="rods",
-    ),
-    _chain(
-        "off centre",
-        "beam offsets",
-        lambda side: side.protocol.priors.off_centre * side.slope if side.steepest else None,
-        level=lambda side: -side.edges.turn,
-    ),
-    _chain(
-        "width",
-        "width",
-        lambda side: side.record.chain.width_u,
-        shared="chain",
-        level=lambda side: -side.edges.sign,
-    ),
-    _chain(
-        "swing",
-        "swing",
-        _swing_sd,
-        moves="places",
-        path=_swung,
-        level=lambda side: side.edges.drawn,
-        scale="swing",
-    ),
-    _struck("alpha", "edges", lambda _: math.inf, moves="gains"),
-    _struck(
-        "impulses",
-        "single impulses",
-        _impulse_sd,
-        moves="gains",
-        path=lambda side: np.eye(side.rods),
-        absent=_bounces,
-    ),
-    _struck(
-        "contact",
-        "contact",
-        lambda side: side.protocol.contact.level.u,
-        shared="condition",
-        moves="places",
-        path=_contact,
-    ),
-    _struck("strike", "contact", _strike_sd),
-    _struck(
-        "top",
-        "top rod",
-        _top_sd,
-        moves="places",
-        path=_top,
-        level=lambda side: -side.edges.alone.astype(np.float64),
-    ),
-    _struck(
-        "turned",
-        "width",
-        _turned_sd,
-        level=lambda side: -side.edges.sign * side.edges.alone,
-        absent=_all,
-    ),
-    _early("landed", level=lambda side: -side.edges.landed * side.edges.alone),
-    _early("lying", level=lambda side: -side.edges.landed * ~side.edges.alone, absent=_all),
-    _struck(
-        "strings",
-        "single impulses",
-        lambda side: side.protocol.priors.strings * abs(side.record.alpha),
-        shared="condition",
-        moves="gains",
-        path=lambda side: above(side.record.chain.chain)[:, None] ** -2.0,
-        absent=_all,
-    ),
-    _stretch("stretch"),
-    _stretch("usual stretch", shared="condition"),
-    _struck("late", "late pull", _late_sd, absent=_all),
+        name.rstrip("*"),
+        line,
+        PRIORS[name],
+        cast(Any, of),
+        cast(Any, shared),
+        moves,
+        PATHS.get(name, lambda _: np.ones(1)),
+        LEVELS.get(name),
+        float(moves == "rate"),
+        scale,
+        ABSENT.get(name, partial(lambda share, _: share, float(absent))),
+    )
+    for name, line, of, shared, moves, scale, absent in read_rows(__file__)
 )
-"""Unknowns in the order of a drop's vector. `strike` and `late` act on results, not on edges."""
+"""Unknowns in the order of a drop's vector, from ``unknowns.txt``."""
 
 
 class Unknowns:
@@ -438,8 +361,6 @@ class Unknowns:
         own block.
     blocks
         Slice of the vector for each block, by name.
-    groups
-        Blocks of each line of the uncertainty budget.
     sd
         Prior standard uncertainties, shape ``(unknowns,)``; 1 in SI units without a prior.
     flat
@@ -451,7 +372,6 @@ class Unknowns:
     def __init__(self, model: DropModel) -> None:
         self.rows: dict[str, Unknown] = {}
         self.blocks: dict[str, slice] = {}
-        self.groups: dict[str, list[slice]] = {}
         priors: list[Array] = []
         rates: list[Array] = []
         size = 0
@@ -461,7 +381,6 @@ class Unknowns:
                 continue
             self.rows[name] = row
             self.blocks[name] = block = slice(size, size + prior.size)
-            self.groups.setdefault(row.line, []).append(block)
             priors.append(prior)
             rates.append(np.full(prior.size, row.rate))
             size = block.stop

@@ -77,7 +77,7 @@ def quadratic_form(run: Run, drop: Fit | JointDrop, shared: SharedUnknowns) -> Q
     at, record = model.unknowns, model.records["impact"]
     assert record.ratios is not None
     common, here = shared.places(model)
-    alphas = model.alphas(x) + x[at["impulses"]]
+    alphas = x[at["alpha"]] + x[at["impulses"]]
     blocks, edges = _blocks(drop, alphas)
     sd = np.append(at.sd, np.ones(alphas.size + len(EXTRA)))
     # Of one drop alone: its own unknowns, and how far each impulse is off its mean.

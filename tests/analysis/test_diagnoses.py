@@ -3,6 +3,7 @@
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from bench.studies.diagnoses import judged
@@ -11,12 +12,14 @@ from bench.studies.wrong_rigs import WRONG_RIGS
 from rig.analysis.faults import Premise, Suspects, alike, faults, rods_of, turn
 from rig.analysis.result import GOOD
 from rig.clock.calibration import TimeScale
+from rig.estimate.curves import model_fall
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Drag
 from rig.protocol.reader import parse
+from rig.records import Edge
 from rig.units import Quantity
 from sim.dials import Dials, read_dials
-from tests.analysis.drops import GRADED, UNIFORM, Case, case, codes, with_dials
+from tests.analysis.drops import GRADED, HZ, UNIFORM, Case, case, codes, with_dials
 from tests.analysis.sessions import MILD
 from tests.tables import cases
 
@@ -50,6 +53,54 @@ def test_a_chain_that_hangs_a_rod_s_distance_higher_has_no_rod_too_many():
     (named,) = (reason for reason in result.reasons if "log_odds" in reason.values)
     assert named.code == "drop_height"
     assert abs(named.values["size_m"] - pitch) < named.values["U95_m"]
+
+
+CALM = with_dials(jitter_sd=2e-6, missed=0.01, gate_sd=0.2e-3, rod_sd=0.2e-3)
+
+
+def braked(side: str, moment: float, jerk: float, rub: float) -> Case:
+    """A chain that is slower by a jerk, m/s, or rubs with a deceleration, m/s², from a moment on.
+
+    An edge comes as the chain's height, and what it is behind, reach that of the edge before.
+    """
+    one, begin = case(UNIFORM, CALM, incline=50.0, seed=3), CALM.delay
+    channels = {gate.channel for gate in one.protocol.gates.on(side)}
+    fall = model_fall(one.protocol, one.run, side)
+    times = np.linspace(0.0, 1.5, 300_001)
+    since = np.maximum(times - moment, 0.0)
+    heights = fall.heights(times)[0] + jerk * since + 0.5 * rub * since**2
+
+    def later(edge: Edge) -> Edge:
+        level = fall.heights(np.array([edge.tick / HZ - begin]))[0]
+        when = begin + float(np.interp(-level, -heights, times)[0])
+        return edge._replace(tick=round(when * HZ))
+
+    edges = [later(edge) if edge.channel in channels else edge for edge in one.drop.edges]
+    return one.with_edges(edges)
+
+
+@pytest.mark.parametrize(
+    ("side", "moment", "jerk", "rub"),
+    [
+        ("free", 0.25, 0.05, 0.0),
+        ("free", 0.35, 0.15, 0.0),
+        ("free", 0.3, 0.0, 0.5),
+        ("impact", 0.25, 0.15, 0.0),
+        ("impact", 0.35, 0.25, 0.0),
+    ],
+)
+def test_a_chain_that_is_braked_is_named_with_its_moment(side, moment, jerk, rub):
+    result = braked(side, moment, jerk, rub).analyze()
+    assert result.verdict == "void"
+    (named,) = (reason for reason in result.reasons if "log_odds" in reason.values)
+    assert (named.code, named.values["side"]) == ("braked", side)
+    assert named.values["time_s"] == pytest.approx(moment, abs=0.03)
+    assert f"on the {side} side was braked" in named.text
+
+
+def test_a_chain_braked_before_all_gates_is_a_late_one_that_hung_elsewhere():
+    """By a jerk at t₀ it falls gt²/2 − jerk (t − t₀): no edge tells that from a release later."""
+    assert "braked" not in codes(braked("free", 0.02, 0.03, 0.0).analyze())
 
 
 def shorter(rods, length, without):

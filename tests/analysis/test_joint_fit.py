@@ -45,14 +45,13 @@ class Whole:
         self.group = np.empty(size, dtype=object)
         for drop, place in zip(joint.drops, self.columns, strict=True):
             sd = drop.model.unknowns.sd
-            for rows in linearize(drop.model, drop.matches, drop.x, cut=STRAY).rows.values():
+            for rows in linearize(drop.model, drop.fitted, drop.x, cut=STRAY).rows.values():
                 slopes, there = rows.slopes * sd[rows.columns], place[rows.columns]
                 self.data[np.ix_(there, there)] += slopes.T @ slopes
                 self.vector[there] += slopes.T @ rows.left
             self.x[place] = drop.model.unknowns.pull(drop.x)
-            for name, blocks in drop.model.unknowns.groups.items():
-                for block in blocks:
-                    self.group[place[block]] = name
+            for name, row in drop.model.unknowns.rows.items():
+                self.group[place[drop.model.unknowns[name]]] = row.line
         self.inverse = np.linalg.inv(self.data + np.eye(size))
 
 
