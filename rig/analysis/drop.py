@@ -158,7 +158,7 @@ class DropCase:
             tried.append(low)
             case = replace(stated, aside=low)
             if drop_fit is None or not low:
-                reading, fit = case._fit(readings)
+                reading, fit = case._fit(readings, begun)
             else:
                 fit = settle(approach(case._model(drop_fit.model.alpha), drop_fit.x))
             drop_fit = fit
@@ -166,7 +166,7 @@ class DropCase:
             without = result, _ = case._judge(reading, fit, readings, explain=False)
             if not is_wrong(result.reasons):
                 return without
-            reading, fit = stated._fit(readings)
+            reading, fit = stated._fit(readings, begun)
         return stated._judge(reading, fit, readings, explain=explain)
 
     def _too_low(self, drop: DropFit | None) -> tuple[int, ...]:
@@ -198,10 +198,12 @@ class DropCase:
             readings[self.aside] = reading
         return reading
 
-    def _fit(self, readings: Readings) -> tuple[DropIdentity, Fit | None]:
+    def _fit(
+        self, readings: Readings, begun: DropFit | None = None
+    ) -> tuple[DropIdentity, Fit | None]:
         """Return the identification of the drop, and its fit if the edges match a fall."""
         reading = self._identify(readings)
-        begun = self._begin(reading)
+        begun = begun or self._begin(reading)
         if begun is None:
             return reading, None
         fit = settle(begun)

@@ -43,7 +43,7 @@ FEWEST = 4
 IDENTIFIED = 0.5
 """Least relative reduction of the prior variance for an unknown to count as identified."""
 _ROUNDS = 60  # few drops need many rounds, as they determine the scatter poorly
-_FIRST = 1  # rounds until shared and own unknowns fit together
+_FIRST = 2  # rounds until shared and own unknowns fit together
 _DONE = 0.02
 """Last step in standard uncertainties, root mean square over independent sums of shared unknowns,
 and last relative change of the components."""
@@ -176,14 +176,13 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
     shared, groups = group_drops(fits)
     x, beforehand = np.zeros(len(shared)), priors(fits[0].model.protocol)
     evidence = Evidence(beforehand, beforehand)
-    settled, moved, size, before = False, 0.0, len(shared), evidence.components
+    settled, size, before = False, len(shared), evidence.components
     previous = np.zeros(size + len(before.__slots__))
     damping, inverse = np.ones_like(previous), np.eye(size)
     for round_ in range(_ROUNDS):
         groups = with_priors([group.at(x) for group in groups], evidence.components)
         # In the first round shared and own unknowns do not fit together yet: cut no residuals.
-        cut = STRAY if round_ else math.inf
-        sd, root, groups = joint_step(groups, x, cut)
+        sd, root, groups = joint_step(groups, x, STRAY if round_ else math.inf)
         step = damping[:size] * root.step()
         moves = _move(groups, x, sd, step) if np.isfinite(step).all() else None
         if moves is None:
@@ -191,13 +190,12 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
             break
         x, groups, residuals = moves
         inverse = np.linalg.inv(root.matrix).astype(np.float64, copy=False)
-        last, moved = moved, length(step, root.matrix) / math.sqrt(size)
+        moved = length(step, root.matrix) / math.sqrt(size)
         before = evidence.components
         evidence = Evidence(before, beforehand)
         evidence.edges(residuals)
         _weigh(evidence, shared, x, sd, inverse, groups)
-        # With linear convergence, the next step is shorter by the ratio of the last two.
-        settled = round_ > _FIRST and (moved < _DONE or moved**2 < _DONE * last)
+        settled = moved < _DONE
         if settled and _steady(before, evidence.components, groups):
             break
         # Halve steps that alternate, as they do next to a lower bound of a component.

@@ -108,7 +108,7 @@ class DropGroup:
         Places of the unknowns.
     best, gain
         Least-squares step of the drops' own unknowns, in units of their prior uncertainties, and
-        the mean of its derivatives by the shared ones; drops of a condition hardly differ in these.
+        its derivatives by the shared ones, with half of the digits: they take most of the memory.
     variances, blocks
         Variances of their own unknowns, given the shared ones, in units of the prior variances; and
         the covariance of each block with a variance component. Shape ``(drops, own)``, and
@@ -152,18 +152,17 @@ class DropGroup:
         for name, row, inside in self._own_blocks():
             if row.scale:
                 blocks[name] = inverse[:, inside] @ np.swapaxes(inverse[:, inside], 1, 2)
-        variances = np.sum(inverse**2, axis=-1)
-        parts = {"best": best, "gain": gain.mean(axis=0), "variances": variances, "blocks": blocks}
-        slopes = rest.slopes.reshape(-1, here.size)
-        return replace(self, **parts), EquationRows(slopes, rest.left.ravel(), here)
+        rows = EquationRows(rest.slopes.reshape(-1, here.size), rest.left.ravel(), here)
+        variances, gain = np.sum(inverse**2, axis=-1), gain.astype(np.float32)
+        return replace(self, best=best, gain=gain, variances=variances, blocks=blocks), rows
 
     def told(self, inverse: Array) -> tuple[Array, dict[str, Array]]:
         """Return `variances` and `blocks` with shares of the shared unknowns, of R⁻¹ `inverse`."""
         root, blocks = self.gain @ inverse[self.places.here], dict(self.blocks)
         for name, _, inside in self._own_blocks():
             if name in blocks:
-                blocks[name] = blocks[name] + root[inside] @ root[inside].T
-        return self.variances + np.sum(root**2, axis=1), blocks
+                blocks[name] = blocks[name] + root[:, inside] @ np.swapaxes(root[:, inside], 1, 2)
+        return self.variances + np.sum(root**2, axis=-1), blocks
 
     def _own_blocks(self) -> Iterator[tuple[str, Unknown, slice]]:
         """Yield the name, row, and places among the own unknowns of each of their blocks."""
@@ -175,9 +174,10 @@ class DropGroup:
 
     def add_gains(self, gains: Mapping[str, Array]) -> None:
         """Add the sum of GᵀG over the drops' own unknowns to that of each line of the budget."""
-        inner = np.ix_(self.places.here, self.places.here)
+        here = self.places.here
         for _, row, inside in self._own_blocks():
-            gains[row.line][inner] += len(self.drops) * self.gain[inside].T @ self.gain[inside]
+            flat = self.gain[:, inside].reshape(-1, here.size).astype(np.float64)
+            gains[row.line][np.ix_(here, here)] += flat.T @ flat
 
     def split(self) -> Iterator[tuple[int, JointDrop]]:
         """Yield each drop with its number, without strays."""
@@ -230,7 +230,7 @@ def with_priors(groups: Sequence[DropGroup], components: Components) -> list[Dro
 
 
 def _edges(model: DropModel, drops: Sequence[DropFit]) -> dict[str, Seen]:
-    edges, at = {}, model.unknowns
+    edges = {}
     models = [model.with_edges(drop.model.records) for drop in drops]
     for role, expected in model.expected.items():
         times = np.empty((len(drops), expected.rods.size))
@@ -239,7 +239,7 @@ def _edges(model: DropModel, drops: Sequence[DropFit]) -> dict[str, Seen]:
             pairing = models[n].pairings[role]
             pick, edge = matched(drop.matches[role])
             # Any moment after the release: at rest, a chain has no uncertainty.
-            fallen = drop.x[at[f"{role} release"]] + 1.0
+            fallen = drop.x[model.unknowns[f"{role} release"]] + 1.0
             times[n] = pairing.times[edge].max() if edge.size else fallen
             times[n, pick], burst[n, pick] = pairing.times[edge], pairing.burst[edge]
         edges[role] = expected.seen(np.arange(expected.rods.size), times, burst)
