@@ -87,9 +87,9 @@ class Budgets:
         """
         inverse, gain = drop.solve()
         gradient = slopes * drop.model.unknowns.sd
-        own = gradient[..., drop.places.own]
-        response = gradient[..., drop.places.common] - own @ gain
-        return gradient, own @ inverse, response @ self.joint.inverse[drop.places.here]
+        own, common, here = drop.places
+        response = gradient[..., common] - gradient[..., own] @ gain
+        return gradient, gradient[..., own] @ inverse, response @ self.joint.inverse[here]
 
     def _measure(self, drop: JointDrop, values: Sequence[Dual]) -> list[Measured]:
         """Return values with their uncertainty, degrees of freedom, budget and deviation."""
@@ -134,7 +134,7 @@ class Budgets:
         moved, solved
             w of the drop's own unknowns, and the same with the shared ones given.
         """
-        (line, predicted, absent), inner = _prior_info(drop.model), drop.places.own
+        (line, predicted, absent), (inner, outer, here) = _prior_info(drop.model), drop.places
         root = self.joint.inverse  # R⁻¹, a square root of the shared covariance
         if root.size:  # widen guessed lines to their expanded uncertainty
             wider = (coverage_factor(GUESSED) / COVERAGE_95) ** 2
@@ -149,11 +149,8 @@ class Budgets:
             part = np.sum(common * error**2, axis=1, keepdims=True)
             return own - part[:, 0], np.sqrt(part), 0.0 * part
         moves, lost = np.zeros(shared.shape), np.zeros(len(root))
-        moves[:, drop.places.here], lost[drop.places.here] = (
-            true[:, drop.places.common],
-            absent[drop.places.common],
-        )
-        without = direct @ drop.solve()[1] @ root[drop.places.here]
+        moves[:, here], lost[here] = true[:, outer], absent[outer]
+        without = direct @ drop.solve()[1] @ root[here]
         off = moves - shared @ root.T
         surplus, less = (off * np.sqrt(np.maximum(0.0, part)) for part in (-lost, lost))
         # hCh + h(Ce) + (eC)h is the form of h + e less that of e; e = −Gᵀ of the predicted ones.

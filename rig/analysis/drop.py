@@ -150,24 +150,26 @@ class DropCase:
             reasons = (make_reason("record_damaged", text=drop.damage),)
             return DropResult(self.run, drop.attempt, "void", reasons, Audit(), damaged=True), None
         case = stated = self._at_contact()
-        reading = stated._identify(readings)
-        drop_fit = begun = stated._begin(reading)
-        tried, fit = list[tuple[int, ...]](), None
+        whole = reading = stated._identify(readings)
+        begun = latest = stated._begin(whole)
+        fits: dict[tuple[int, ...], tuple[DropIdentity, Fit | None]] = {}
         # Not identified with all gates, a drop says nothing about those that are left out.
-        while (low := (case if begun is None else stated)._too_low(drop_fit)) not in tried:
-            tried.append(low)
+        while (low := (case if begun is None else stated)._too_low(latest)) not in fits:
             case = replace(stated, aside=low)
-            if drop_fit is None or not low:
-                reading, fit = case._fit(readings, begun)
+            if not low:
+                fits[low] = case._settle(whole, begun)
+            elif latest is None:
+                reading = case._identify(readings)
+                fits[low] = case._settle(reading, case._begin(reading))
             else:
-                fit = settle(approach(case._model(drop_fit.model.alpha), drop_fit.x))
-            drop_fit = fit
+                fits[low] = reading, settle(approach(case._model(latest.model.alpha), latest.x))
+            reading, latest = fits[low]
         if case.aside:
-            without = result, _ = case._judge(reading, fit, readings, explain=False)
+            without = result, _ = case._judge(*fits[case.aside], readings, explain=False)
             if not is_wrong(result.reasons):
                 return without
-            reading, fit = stated._fit(readings, begun)
-        return stated._judge(reading, fit, readings, explain=explain)
+        with_all = fits.get(()) or stated._settle(whole, begun)
+        return stated._judge(*with_all, readings, explain=explain)
 
     def _too_low(self, drop: DropFit | None) -> tuple[int, ...]:
         """Return the gates that are left out or too low for a drop, fitted with any of them."""
@@ -198,12 +200,10 @@ class DropCase:
             readings[self.aside] = reading
         return reading
 
-    def _fit(
-        self, readings: Readings, begun: DropFit | None = None
+    def _settle(
+        self, reading: DropIdentity, begun: DropFit | None
     ) -> tuple[DropIdentity, Fit | None]:
-        """Return the identification of the drop, and its fit if the edges match a fall."""
-        reading = self._identify(readings)
-        begun = begun or self._begin(reading)
+        """Return the identification of a drop, and its fit if the edges match a fall."""
         if begun is None:
             return reading, None
         fit = settle(begun)

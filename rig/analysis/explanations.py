@@ -45,7 +45,7 @@ from rig.records import Drop
 CLEAR = math.log(100.0)
 """Least log odds of a named fault against every rival and the stated protocol. Also the cost of a
 fault's prior probability: 1 drop in 100 has a given fault."""
-_NAMED = 3  # faults listed if none is clear
+_NAMED = 3  # faults listed if none is clear, and moments of a brake that are fitted
 _TRIED = 5  # faults that are fitted: those with the largest score, and those with the most votes
 _BEYOND = 10.0  # factor on the prior of the stretch, in a fall that departs from the equations
 
@@ -201,19 +201,22 @@ class Explainer:
         # For a good reading the score test excludes faults without gain. A fault may also remove
         # the penalty for negative drag.
         least = min(0.0, held_back(fit)) if well_read(fit) else -math.inf
-        ranked = [sized[n] for n in np.argsort(gains) if gains[n] > least]
-        likely = {fault.kin: fault for fault in ranked}.values()  # the likeliest of its kin is last
-        for fault in sorted(likely, key=ranked.index, reverse=True)[:_TRIED]:
-            odds, alike = self._score_odds(fit, self.stated, fault.alike), fault.alike
+        likely: dict[object, Fault] = {}
+        for n in np.argsort(-gains).tolist():
+            if gains[n] > least:
+                likely.setdefault(sized[n].kin, sized[n])
+        for alike in [fault.alike for fault in likely.values()][:_TRIED]:
+            odds = self._score_odds(fit, self.stated, alike)
             for n in np.argsort(-odds)[:_NAMED].tolist():
                 yield from self._fit_size(alike[n], 0.0, fit)
 
     def _score_odds(self, fit: Fit, premise: Premise, faults: Sequence[Fault]) -> Array:
         """Return the log odds of continuous faults by their score, without their prior's cost."""
-        # With the stated protocol they are the same for all drops of a condition.
+        # Directions from the stated protocol are the same for all drops of a condition.
         is_stated = premise is self.stated and not fit.model.suspects
         known, vectors = fit.model.directions if is_stated else {}, []
-        for key, fault in [((fault.code, repr(fault.where)), fault) for fault in faults]:
+        for fault in faults:
+            key = fault.code, repr(fault.where)
             if key not in known:
                 known[key] = fault.direction(premise, fit.model)
             vectors.append(known[key])

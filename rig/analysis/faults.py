@@ -124,9 +124,8 @@ class Fault:
         if not self.power:
             return None
         times, speeds = _passages(fit, self.where["side"])
-        first, last = times.min(initial=np.inf), times.max(initial=-np.inf)
-        moment = first + self.moment * (last - first)
-        behind = (np.maximum(times - moment, 0.0) / (last - moment)) ** self.power
+        moment = times.min() + self.moment * np.ptp(times)  # a fitted side has edges
+        behind = (np.maximum(times - moment, 0.0) / (times.max() - moment)) ** self.power
         return Braked(self.where["side"], float(moment), behind, behind / speeds)
 
     def direction(self, stated: Premise, model: DropModel) -> Array:
