@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.analysis.chain_records import WIDER, ChainRecord, EdgeTrain
+from rig.analysis.components import ANY_ALPHA, any_alpha_sd
 from rig.analysis.departures import LOWEST_START
 from rig.analysis.free_flight import FAINT
 from rig.analysis.trajectory import (
@@ -36,8 +37,6 @@ MISSED = 0.02
 """Prior probability that an expected edge is missed."""
 STRAYS = 2.0
 """Prior rate of stray edges at a gate, 1/s."""
-ANY_ALPHA = (-0.10, 0.60)
-"""Range of the impact coefficient: energy allows 0 to ½, with a margin at both ends."""
 RELEASE, START, CLOCK, PULL, DRAG, ALPHA, UNKNOWNS = range(7)
 """Columns of a fall's unknowns: release time, start height, clock rate, g, κ, α; their number."""
 PART = 6.0
@@ -328,8 +327,7 @@ class SideFall:
         sd[CLOCK] = clock_u
         sd[PULL] = ANY_GRAVITY if protocol.surface is None else protocol.gravity.u
         if record.ratios is not None:
-            # Standard deviation of a uniform distribution over the range of α.
-            sd[ALPHA] = (ANY_ALPHA[1] - ANY_ALPHA[0]) / math.sqrt(12.0)
+            sd[ALPHA] = any_alpha_sd()
         return cls(record, pairing, stated, sd, sigma)
 
     @cached_property

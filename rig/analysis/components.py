@@ -12,6 +12,8 @@ from rig.model.chain import Chain
 from rig.protocol.protocol import Priors, Protocol
 
 _DEFAULT = Priors()
+ANY_ALPHA = (-0.10, 0.60)
+"""Range of the impact coefficient: energy allows 0 to ½, with a margin at both ends."""
 SHARPEST = 1e-6
 """Least scatter of an edge, m: no rod is rounder and no beam sharper, whatever is stated."""
 
@@ -89,6 +91,8 @@ class Components:
     def impulses(self, alpha: float, above: Array, uneven: float = 1.0) -> Array:
         """Return the standard deviation of each impulse's α, for a mean α.
 
+        No impulse scatters by more than the range of α.
+
         Parameters
         ----------
         above
@@ -97,7 +101,12 @@ class Components:
             See `rig.analysis.chain_records.ChainRecord.uneven`.
         """
         even = math.hypot(self.impulse * alpha * uneven, self.impulse_floor)
-        return np.hypot(even, self.bounce * alpha / above)
+        return np.minimum(np.hypot(even, self.bounce * alpha / above), any_alpha_sd())
+
+
+def any_alpha_sd() -> float:
+    """Return the standard deviation of a uniform distribution over `ANY_ALPHA`."""
+    return float(np.ptp(ANY_ALPHA)) / math.sqrt(12.0)
 
 
 def above(chain: Chain) -> Array:

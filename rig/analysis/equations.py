@@ -159,7 +159,7 @@ class ExpectedEdges(NamedTuple):
 def _landing_sd(u: Array, to_strike: Array) -> Array:
     """Return `ExpectedEdges.landed` for normally distributed strikes, which slow their rods."""
     z = np.divide(to_strike, u, out=np.zeros_like(u), where=u > 0.0)
-    beyond = 0.5 * np.vectorize(math.erfc)(z / math.sqrt(2.0))
+    beyond = 0.5 * np.vectorize(math.erfc, otypes=[float])(z / math.sqrt(2.0))
     square = (1.0 + z * z) * beyond - z * np.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
     sd: Array = SLOWED * u * np.sqrt(np.maximum(square, 0.0))
     return sd

@@ -47,7 +47,8 @@ CLEAR = math.log(100.0)
 fault's prior probability: 1 drop in 100 has a given fault."""
 _NAMED = 3  # faults listed if none is clear, and moments of a brake that are fitted
 _TRIED = 5  # faults that are fitted: those with the largest score, and those with the most votes
-_BEYOND = 10.0  # factor on the prior of the stretch, in a fall that departs from the equations
+_DEPARTURES = "stretch", "landed", "bounce"
+_BEYOND = 10.0  # factor on the scale of a departure, in a fall that departs from the equations
 
 
 _NEITHER = Fault("", lambda stated, _: stated)
@@ -178,11 +179,10 @@ class Explainer:
         if is_clear and "stretch" in fit.model.unknowns:
             # The fall may depart from the equations, without a fault.
             scales = fit.model.components
-            wider = replace(
-                scales, stretch=_BEYOND * scales.stretch, landed=_BEYOND * scales.landed
-            )
-            reading = weigh(settle(approach(fit.model.copy_with(components=wider), fit.x)))
-            yield Explanation(_NEITHER, {}, self._evidence(reading, self.stated.hz) - CLEAR)
+            for name in _DEPARTURES:
+                wider = replace(scales, **{name: _BEYOND * getattr(scales, name)})
+                reading = weigh(settle(approach(fit.model.copy_with(components=wider), fit.x)))
+                yield Explanation(_NEITHER, {}, self._evidence(reading, self.stated.hz) - CLEAR)
 
     def _read_alone(self, record: ChainRecord) -> float:
         """Return the evidence of a side by itself, for a drop that was not identified."""

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 import numpy as np
 
 from rig.analysis.chain_records import ChainRecord
-from rig.analysis.components import Components, above
+from rig.analysis.components import Components, above, priors
 from rig.analysis.departures import MODES, drawn, lags, lever, slack, strike_u, swing_sd
 from rig.analysis.equations import SHARED, ExpectedEdges, standardise
 from rig.analysis.trajectory import COMMON, DRAG, GRAVITY, RELEASE, START
@@ -213,10 +213,10 @@ def _stretch_sd(side: Side) -> list[float]:
 
 
 def _late_sd(side: Side) -> float:
-    """Prior of the late pull, in proportion to bouncing: no edge measures this unknown."""
-    priors = side.protocol.priors
-    bounce = side.model.components.bounce / priors.last_impulse if priors.last_impulse else 1.0
-    return bounce * priors.late_pull
+    """Prior of the late pull, in proportion to the scatter of the last pull that edges measure."""
+    stated, last = priors(side.protocol), np.ones(1)
+    scatter, usual = (each.impulses(side.alpha, last) for each in (side.model.components, stated))
+    return side.protocol.priors.late_pull * float(scatter[0] / usual[0] if usual[0] else 1.0)
 
 
 def _unlike_air_sd(side: Side) -> float | None:

@@ -3,12 +3,16 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from bench.studies.coverage import WORLDS, draw_rigs
 from bench.studies.falls import Asked, falls
 from bench.studies.time_scales import time_scale
+from rig.analysis.components import Components
 from rig.analysis.drop import DropCase
 from rig.protocol.plan import runs as planned
+from rig.protocol.reader import parse
 from tests.analysis.drops import PROTOCOLS, UNIFORM, codes
 
 pytestmark = pytest.mark.usefixtures("loops_compiled")
@@ -56,3 +60,31 @@ def test_what_was_found_of_it_is_kept_for_the_next_time(piled):
     assert again.result.quantities == first.result.quantities
     assert json.dumps(again.result.json()) == json.dumps(first.result.json())
     assert case.restore_drop(first).rods_of(len(first.result.rods)) == first.result.rods
+
+
+def test_a_fall_that_departs_from_the_equations_lacks_no_rod(monkeypatch, tmp_path):
+    """Its top rod misses two gates: odds of 10⁴ for a rod less, but more for livelier strings."""
+    flat = WORLDS["resolved"]._replace(inclines=(0.0, 35.0), repeats=(1, 4))
+    monkeypatch.setitem(WORLDS, "resolved", flat)
+    rig = draw_rigs(str(PROTOCOLS), "resolved", 33, 402)[11]
+    protocol = parse(rig.text)
+    run = next(run for run in planned(protocol) if run.number == 4)
+    (fall,) = falls([rig.ask(tmp_path)._replace(runs=[[4]])])
+    result, _ = DropCase(protocol, run, fall.drop, time_scale(rig.seed)).read()
+    assert result.verdict == "accepted"
+    assert "rod_count" not in codes(result)
+
+
+def test_no_impulse_scatters_by_more_than_its_whole_range():
+    """Single impulses of ±3 on a pile, which no energy allows, made V uncertain by itself."""
+    wild = Components(impulse=30.0, impulse_floor=3.0, bounce=100.0)
+    sd = wild.impulses(0.1, np.array([1.0, 2.0, 24.0]))
+    assert sd == pytest.approx([0.7 / 12**0.5] * 3)
+
+
+def test_a_gate_below_the_surface_expects_no_edge_and_breaks_nothing(piled):
+    case, _ = piled[0]
+    gates = [replace(gate, height=-0.05) for gate in UNIFORM.gates.gates]
+    sunk = replace(case, protocol=UNIFORM.with_gates(gates))
+    result, fit = sunk.read(explain=False)
+    assert (result.verdict, fit) == ("void", None)
