@@ -69,8 +69,8 @@ class Discrepancy:
     lead
         Distance by which impacts bring the chain ahead of a free fall until the last, m.
     late_pull, late_way
-        Gain of speed of the top rod by the whole last impulse, m/s, and the distance below the
-        lowest beam, m, where no edge measures that gain.
+        Gain of speed of the top rod by the impulses that come after its last passage of a beam, m/s
+        (at least by the last, which may come late), and the distance below that beam, m.
     """
 
     nominal: Trajectory
@@ -101,11 +101,13 @@ class Discrepancy:
         lead = float((free.heights(nominal.time[-1:])[0] - nominal.height[-1:])[0])
         if nominal.hits is None or strikes.size < 2:
             return cls(nominal, stretch, lead, 0.0, 0.0)
-        pull = abs(record.alpha) * float(nominal.hits.ratio[-2] * nominal.hits.arrival[-2])
+        gap = float(strikes[-1] - strikes[-2])
         seeing = [train for train in record.trains if strikes.size - 1 in train.rods]
-        lowest = min((protocol.gates.gates[beam.gate].height for beam in seeing), default=np.inf)
-        hidden = max(0.0, min(lowest, float(strikes[-1] - strikes[-2])))
-        return cls(nominal, stretch, lead, pull, hidden)
+        lowest = min((protocol.gates.gates[beam.gate].height for beam in seeing), default=gap)
+        unseen = strikes[-1] - strikes[:-1] <= max(lowest, gap)
+        pulls = (nominal.hits.ratio * nominal.hits.arrival)[:-1]
+        pull = abs(record.alpha) * float(pulls[unseen].sum())
+        return cls(nominal, stretch, lead, pull, max(0.0, lowest))
 
     def top(self, levels: Array) -> Array:
         """Return the modes of the top rod for levels of the reference point, m."""

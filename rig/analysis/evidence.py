@@ -180,6 +180,9 @@ class Evidence:
         of a, by multiplicative steps.
         """
         kinds, (squares, unsure, counts) = members[:-3], members[-3:]
+        if not squares.size:  # all edges are those of rods that may have struck
+            new.update((name, getattr(self.stated, name)) for name in names)
+            return
         stated = np.array([getattr(self.stated, name) ** 2 for name in names])
         variances = np.array([getattr(self.components, name) ** 2 for name in names])
         # Spread the prior's members over all rows, so that no component is favoured.

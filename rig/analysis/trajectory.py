@@ -30,9 +30,6 @@ ONE = np.ones(1)
 COMMON = 4
 RELEASE, START, GRAVITY, DRAG = range(COMMON)
 """Columns of every trajectory's derivatives: release time, start height, acceleration, κ."""
-_NO_LESS = 1e-3
-"""Least share of its speed that a chain keeps at an impact: trial steps may give less than 0."""
-
 _NORMAL = math.sqrt(2.0 / math.pi)
 """Slope at 0 of 2Φ(z) − 1, with Φ the normal distribution; tanh of it follows to 2 %."""
 _FAINT = 1e-3
@@ -260,7 +257,7 @@ class Trajectory:
         distance, arrival, gains, ratio = self.hits
         row = np.arange(arrival.shape[-1])
         kappa, share = self.kappas(row), self.shares(row)
-        factor = _factors(gains)
+        factor = 1.0 + gains
         d_factor = ratio[:, None] * gain
         d_height = np.concatenate([common[[START]], -places])
         ways = d_height[:-1] - d_height[1:]
@@ -298,11 +295,6 @@ def _by_kappa(
     rest = 1.0 - kappa * reach
     slope: Array = gravity * reach_slopes(distance, reach, kappa) - 2.0 * distance * rest * speed**2
     return slope
-
-
-def _factors(gains: Array) -> Array:
-    """Return the factor by which each impact changes the chain's speed."""
-    return np.maximum(1.0 + gains, _NO_LESS)
 
 
 def _sum_legs(remaining: Array, factor: Array, added: Array) -> Array:
@@ -373,7 +365,7 @@ def struck_trajectory(
     height[..., :1], height[..., 1:] = start, -places
     distance = height[..., :-1] - height[..., 1:]
     kappas = some_air(kappa * (float(air[0]) if air.size == 1 else air[: gain.shape[-1]]))
-    reach, factor = reach_of(distance, kappas), _factors(gain)
+    reach, factor = reach_of(distance, kappas), 1.0 + gain
     squares = _sum_legs(1.0 - kappas * reach, factor, gravity * reach)
     arrival = np.sqrt(np.maximum(squares, 0.0))
     speed, time = np.zeros_like(height), np.zeros_like(height)

@@ -7,7 +7,11 @@ from collections.abc import Collection
 import pytest
 
 import rig
+from bench.studies.falls import Asked, falls, simulation
+from bench.studies.time_scales import time_scale
+from rig.analysis.session import analyze
 from rig.protocol.keys import SECTIONS
+from rig.protocol.plan import runs as planned
 from rig.protocol.reader import parse
 from sim.dials import Dials
 from tests.analysis.drops import case
@@ -31,6 +35,23 @@ def test_a_scene_goes_through_every_command(seed, call, tmp_path):
 @pytest.mark.parametrize("seed", [seed for seed in range(MANY) if seed not in SOME])
 def test_many_more_scenes_go_through_every_command(seed, call, tmp_path):
     Journey(call, scene(seed, drops=12), tmp_path).go()
+
+
+@pytest.mark.parametrize("seed", [1051, 1196])
+def test_a_scene_of_which_edges_say_little_is_analysed_as_far_as_they_do(seed, tmp_path):
+    """No edge but of rods that may have struck; one gate that sees a rod after any strike."""
+    odd = scene(seed)
+    path = tmp_path / "scene.yaml"
+    path.write_text(odd.text, encoding="utf-8")
+    runs = [run.number for run in planned(odd.protocol)]
+    drops = [*falls([Asked(simulation(path, url=odd.port), [seed], [runs])])]
+    scale = time_scale(seed)
+    results = analyze(odd.protocol, [fall.drop for fall in drops], lambda _: scale).runs
+    for result, fall in zip(results, drops, strict=True):
+        assert result.verdict == "accepted"
+        for name, measured in result.quantities.items():
+            true = fall.truth.get(name, measured.value)
+            assert abs(measured.value - true) < 2.0 * measured.expanded, name
 
 
 PRIORS = SECTIONS["priors"]
