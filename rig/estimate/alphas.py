@@ -55,8 +55,7 @@ class RunAlpha(NamedTuple):
 
     def json(self) -> dict[str, Any]:
         """One of ``runs``."""
-        run = "run=run.number", "incline_deg=run.incline_deg", "impact_chain=run.impact"
-        return attributes(self, *run, "alpha", "residual?")
+        return attributes(self, "*run", "alpha", "residual?")
 
 
 class SingleAlphas(NamedTuple):

@@ -70,8 +70,7 @@ class DropCurves(NamedTuple):
 
     def json(self) -> dict[str, Any]:
         """One of ``curves``."""
-        run = "run=run.number", "incline_deg=run.incline_deg", "impact_chain=run.impact"
-        record = attributes(self, *run, "height_m") | self.squared_speed.json("speed2_m2_s2")
+        record = attributes(self, "*run", "height_m") | self.squared_speed.json("speed2_m2_s2")
         if self.separation is not None:
             record |= attributes(self, "time_s") | self.separation.json(SEPARATION.name)
         return record

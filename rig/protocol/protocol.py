@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from math import cos, hypot, radians, sin
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
+from rig.plain_data import Record
 from rig.protocol.fields import DEFAULTS
 from rig.units import Quantity
 from rig.vocabulary import FENCE, FREE_CHAIN, OBJECT, ONE_CHAIN, TRACK, TWO_CHAINS, Vocabulary
@@ -439,7 +440,7 @@ class Condition(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Run:
+class Run(Record):
     """One planned drop.
 
     Attributes
@@ -455,6 +456,8 @@ class Run:
     setting
         Values of the keys that the plan varies, in words; empty if it varies none.
     """
+
+    MEMBERS = "run=number incline_deg impact_chain=impact setting?"
 
     number: int
     incline_deg: float

@@ -84,6 +84,7 @@ def test_pages_tables_and_coefficients_tell_the_settings_apart(chains, call, tmp
     assert page.read_text("utf-8").count(CHAINS[1]) > 4
     found = json.loads(call("estimate", str(chains), "--json").out)
     assert [line["setting"] for line in found["alpha"]["inclines"]] == CHAINS
+    assert {run["setting"] for run in found["alpha"]["runs"]} == {*CHAINS}
     call("replay", str(chains))
 
 
