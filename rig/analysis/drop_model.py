@@ -16,7 +16,7 @@ from rig.analysis.annealing import PART, Pairing, SideFall, matched
 from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import ANY_ALPHA, SHARPEST, Components, any_alpha_sd, priors
 from rig.analysis.departures import LOWEST_START, Discrepancy
-from rig.analysis.equations import SHARED, STRAY, Equations, ExpectedEdges, Residuals, Seen
+from rig.analysis.equations import HUBER, SHARED, STRAY, Equations, ExpectedEdges, Residuals, Seen
 from rig.analysis.trajectory import (
     COMMON,
     DRAG,
@@ -238,7 +238,7 @@ class DropModel:
         gains, places = np.split(parameters[..., COMMON:], 2, axis=-1)
         places += record.strikes
         # No string pulls so much: NaN keeps a fit from ending here.
-        far = np.abs(gains - np.mean(ANY_ALPHA)) > STRAY * any_alpha_sd()
+        far = np.abs(gains - np.mean(ANY_ALPHA)) > HUBER * any_alpha_sd()
         gains = np.where(far, math.nan, gains)
         return struck_trajectory(
             release, start, gravity, gains, record.ratios, places, kappa, record.air
