@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 INTERRUPTED = 130
 BOARDS = ["sim", "emu", "bought"]
 FAULTS = ["daemon", "runner", "cable", "reset", "brownout", "disk", "noise", "busy", "race", "deaf"]
-WORLDS = ["model", "resolved", "mujoco", "coefficients", "stated", "usual"]
+WORLDS = ["model", "resolved", "piles", "mujoco", "coefficients", "stated", "usual"]
 
 
 class Option(NamedTuple):

@@ -107,6 +107,7 @@ _RESOLVED = {"dynamics": "resolved", **_STATED}
 WORLDS = {
     "model": World(200, (0.0, 80.0), ("drag",), _STATED),
     "resolved": World(200, (35.0, 80.0), (*DIALS,), _RESOLVED),
+    "piles": World(60, (0.0, 35.0), (*DIALS,), _RESOLVED),
     "mujoco": World(40, (35.0, 80.0), (*DIALS,), _RESOLVED, module="bench.studies.mujoco_world"),
     COEFFICIENTS: World(20, None, ("drag",), _STATED | {"impact_error": "0"}, repeats=(1,)),
     "stated": World(100, None, settings=_STATED, layouts=range(len(GATES), len(GATES) + 1)),
