@@ -314,8 +314,10 @@ def _beside_rods(height_mm: float) -> float:
 
 
 def _heights(scene: Mapping[str, Any]) -> str:
-    sides = (scene["gates"][side] for side in ("impact", "free"))
-    return " + ".join(", ".join(one["height"].split()[0] for one in side) for side in sides)
+    return " + ".join(
+        ", ".join(gate["height"].split()[0] for gate in scene["gates"][side])
+        for side in ("impact", "free")
+    )
 
 
 @one_thread

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from math import cos, hypot, radians, sin
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from rig.plain_data import Record
+from rig.plain_data import Record, attributes
 from rig.protocol.fields import DEFAULTS
 from rig.units import Quantity
 from rig.vocabulary import FENCE, FREE_CHAIN, OBJECT, ONE_CHAIN, TRACK, TWO_CHAINS, Vocabulary
@@ -433,10 +433,9 @@ class Condition(NamedTuple):
         chain = self.impact_chain and f"{self.impact_chain} strikes"
         return ", ".join(filter(None, (f"{self.incline_deg:.15g} deg", chain, self.setting)))
 
-    def json(self) -> dict[str, float | str]:
+    def json(self) -> dict[str, Any]:
         """Return ``incline_deg`` and, if there are any, ``impact_chain`` and ``setting``."""
-        fields = self._asdict().items()
-        return {name: value for name, value in fields if value not in {None, ""}}
+        return attributes(self, "incline_deg", "impact_chain?", "setting?")
 
 
 @dataclass(frozen=True, slots=True)
