@@ -78,16 +78,20 @@ class Hands:
     def __init__(self, app):
         self.app = app
         self.keys = []
-        self.touched = 0.0
+        self.touched = self.looked = 0.0
         self.faces = [(0.0, None)]
 
     def look(self):
-        """Note what a person would see: which page, which stage, and whether something is open."""
+        """Note what a person would see: which page, which stage, and whether something is open.
+
+        It may have been there since the last look: on a busy machine that is long ago.
+        """
         if not self.app._open():
             return  # it was left, on purpose
         now = self.app.page, self.app.flow.stage, len(self.app.screen_stack)
         if now != self.faces[-1][1]:
-            self.faces.append((time.monotonic(), now))
+            self.faces.append((self.looked, now))
+        self.looked = time.monotonic()
 
     async def key(self, key):
         self.look()
