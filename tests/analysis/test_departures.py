@@ -13,9 +13,10 @@ from rig.analysis.likeness import ENOUGH, Likeness, likeness
 from rig.analysis.result import GOOD, Measured
 from rig.analysis.session import Analysis
 from rig.protocol.protocol import Contact
+from rig.protocol.reader import parse
 from rig.units import Quantity
 from sim.dials import Dials
-from tests.analysis.drops import HZ, STATED, UNIFORM, Case, assert_true, case, codes
+from tests.analysis.drops import HZ, SINGLE, STATED, UNIFORM, Case, assert_true, case, codes
 from tests.analysis.sessions import MILD, analysis, cases
 
 GATES = {gate.channel: gate for gate in UNIFORM.gates.gates}
@@ -230,3 +231,11 @@ def test_all_pulls_that_no_beam_sees_may_come_late_and_the_last_in_any_case(lowe
     below[-2] = True
     assert model.discrepancy.late_pull == pytest.approx(pulls[below].sum())
     assert model.discrepancy.late_way == pytest.approx(lowest_m)
+
+
+def test_the_strongest_pulls_that_a_protocol_may_state_are_measured():
+    strong = parse(SINGLE.text.replace("A: {rods", "A: {alpha: 1, rods"))
+    one = case(strong, Dials.quiet())
+    result = one.analyze()
+    assert result.verdict == "accepted"
+    assert_true(result, one.truth, names=["speed_m_s"])
