@@ -59,6 +59,8 @@ class TimerColumn:
         ``blocked`` or ``clear`` where the heading says what all its times did to the beam.
     words
         What two unknown words mean, for which falls decide: the one that begins is ``high``.
+    filled
+        Share of the first rows that have a value.
     """
 
     at: int
@@ -69,6 +71,7 @@ class TimerColumn:
     run: str = ""
     state: str = ""
     words: Mapping[str, str] = field(default_factory=dict)
+    filled: float = 0.0
 
     def __str__(self) -> str:
         meaning = " or ".join(roles()[role][0] for role in self.role.split("|"))
@@ -125,8 +128,10 @@ def columns_of(
     shared = {f"table.{fact}" for fact in set().union(*facts.values())}
     states = sum("all.state" in fact for fact in facts.values())
     shared |= {f"columns.{min(len(facts), _MANY)}", f"states.{min(states, _MANY)}"}
-    shared |= _held({"rated": block.find_time_base()})
+    shared |= _held({"rated": block.find_time_base()[1]})
     columns = [_read_column(block, heading, n, facts[n] | shared, cells[n]) for n in facts]
+    for column in columns:
+        column.filled = len(cells[column.at]) / len(rows)
     if heading is None:
         if any(row.count_known() > 1 and len(row.texts) > width for row in block.headings):
             file.problems.refuse(block.headings[0].line, "heading_unfit", columns=width)

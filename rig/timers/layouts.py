@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,12 +32,8 @@ _MOST_MAPS = 200
 _FEWEST = 3
 """Changes of a drop that tell which gate it passed: two are near those of falls past several."""
 
-SETTINGS = ("unit", "dark", "groups", "first", "pause_s")
-"""What a layout has beside its inputs; `forms.txt` says what each may be."""
 
-
-@dataclass(frozen=True, slots=True)
-class FileLayout:
+class FileLayout(NamedTuple):
     """What a file leaves open.
 
     Attributes
@@ -66,18 +62,26 @@ class FileLayout:
     groups: str = "runs"
     first: str = "state"
     pause_s: float = 0.0
-    channels: Mapping[str, int] = field(default_factory=dict)
+    channels: Mapping[str, int] = MappingProxyType({})
+
+    @property
+    def contradictions(self) -> int:
+        """Count what is contrary to what the file says, or to what its first rows usually say."""
+        return (self.dark == "inverted") + (self.first == "change")
 
     @property
     def text(self) -> str:
         """What ``--map`` accepts."""
-        usual = FileLayout()
-        pairs = [(x, getattr(self, x)) for x in SETTINGS if getattr(self, x) != getattr(usual, x)]
-        pairs += [(x or "input", channel) for x, channel in self.channels.items()]
-        return ",".join(f"{name}={value}" for name, value in pairs)
+        settings = zip(SETTINGS, self, FileLayout(), strict=False)
+        pairs = [f"{name}={value}" for name, value, usual in settings if value != usual]
+        return ",".join([*pairs, *(f"{x or 'input'}={n}" for x, n in self.channels.items())])
 
     def __str__(self) -> str:
         return f"--map '{self.text}'"
+
+
+SETTINGS = FileLayout._fields[:-1]
+"""What a layout has beside its inputs; `forms.txt` says what each may be."""
 
 
 class FileReading:
@@ -115,11 +119,10 @@ class FileReading:
             share = np.maximum(1, np.bincount(drop)[drop] // len(channels))
             label = np.minimum(count_before(drop) // share, len(channels) - 1)
         channel, state = np.array(channels)[label], changes["state"]
-        is_stated = np.isin(state, (STATES.index("blocked"), STATES.index("high")))
         is_first = count_before(drop * (1 + len(channels)) + label) % 2 == 0
         blocked = np.where(
             state > 0,
-            is_stated ^ (layout.dark in {"inverted", "low"}),
+            (state % 2 == 0) ^ (layout.dark in {"inverted", "low"}),
             is_first ^ (layout.dark == "turns-clear") | (layout.dark == "each"),
         )
         # A beam is clear at the beginning; a first row that says so changes nothing.
@@ -182,17 +185,17 @@ def group_changes(file: TimerFile, unit: str, groups: str, pause: float) -> tupl
 
     In a file that says the drops, they are parted by no time; in others where times begin anew.
     """
-    changes, rank = file.changes, file.changes["rank"]
+    changes, tick = file.changes, file.changes["tick"]
     part = changes[{"rows": "line", "columns": "clock"}.get(groups, "run")]
     keys = np.stack([changes["block"] * ("run" not in file.facts), changes["run"], part])
-    order = np.lexsort((rank, changes["line"], *keys[::-1]))
+    order = np.lexsort((tick, changes["line"], *keys[::-1]))
     is_new = np.any(np.diff(keys[:, order], prepend=-1) != 0, axis=0)
     if file.is_stacked and groups in {"runs", "passing"}:
-        is_new |= np.diff(rank[order], prepend=0) < 0
+        is_new |= np.diff(tick[order], prepend=0) < 0
     drop = np.cumsum(is_new)
-    order = order[np.lexsort((rank[order], drop))]
+    order = order[np.lexsort((tick[order], drop))]
     # Nothing does the same twice at once.
-    same = np.stack([drop, *(changes[name][order] for name in ("rank", "label", "state"))])
+    same = np.stack([drop, *(changes[name][order] for name in ("tick", "label", "state"))])
     is_other = np.any(np.diff(same, prepend=-1) != 0, axis=0)
     changes, drops = changes[order][is_other], drop[is_other].astype(np.intp) - 1
     changes["tick"] //= 10 ** POWERS[unit or "s"]
@@ -246,7 +249,7 @@ def find_layouts(file: TimerFile, gates: Sequence[int], bars: int) -> Iterator[F
         pauses = _pauses(file, layout.unit, layout.groups)
         pauses = [float(stated["pause_s"])] if "pause_s" in stated else pauses
         for channels, pause in itertools.product(maps, pauses):
-            yield replace(layout, channels=channels, pause_s=pause)
+            yield layout._replace(channels=channels, pause_s=pause)
 
 
 @lru_cache(4)

@@ -96,8 +96,8 @@ class RowBlock:
                 ranked.append((known, len({*row.texts}), row))
         return max(reversed(ranked), key=lambda rank: rank[:2], default=(0, 0, None))[-1]
 
-    def find_time_base(self) -> TimeBase | None:
-        """Return the first sample's time and the step, s, that settings state; `None` without."""
+    def find_time_base(self) -> TimeBase:
+        """Return the first sample's time and the step, s, that settings state; 0 without."""
         stated, rows = dict[str, float](), [*self.remarks, *self.headings]
         for above, below in itertools.pairwise([*rows, *rows[-1:]]):
             for n, text in enumerate(above.texts):
@@ -109,7 +109,7 @@ class RowBlock:
                     if role and power is not None:
                         stated.setdefault(role, float(number.replace(",", ".")) / 10.0**power)
         step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
-        return (stated.get("start", 0.0), step) if step else None
+        return stated.get("start", 0.0), step
 
     def find_inputs(self, count: int) -> list[str]:
         """Return names of inputs without a heading: those of a row that lists as many."""
