@@ -181,7 +181,9 @@ def _read_column(
 ) -> TimerColumn:
     """Find out what a column is; the row below its heading, or its cells, may say the unit."""
     name = heading.cell(n) if heading else ""
-    column = TimerColumn(n, name or f"column {n + 1}", run=_heading_label(block, heading, n, "run"))
+    above = [name, *(row.cell_over(n) for row in block.headings if row is not heading)]
+    run, gate = (next(filter(None, [find_label(x, y) for x in above]), "") for y in ("run", "gate"))
+    column = TimerColumn(n, name or f"column {n + 1}", run=run)
     prefix, _, rest = name.partition(":")
     if rest.strip() and not find_label(prefix, "gate"):
         column.run, name = column.run or prefix.strip(), rest
@@ -193,7 +195,7 @@ def _read_column(
     unit = "" if find_label(unit, "gate") else unit
     is_numbers = form("row of numbers").fullmatch
     numbers = (row.cell(n) for row in block.headings if is_numbers(row.raw))
-    column.gate = _heading_label(block, heading, n, "gate") or next(numbers, "")
+    column.gate = gate or next(numbers, "")
     roles_of_name = vocabulary.roles_in(bare)
     named = {
         "time": unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"],
@@ -216,22 +218,6 @@ def _read_column(
     if column.role == "edge" and {"pair", "all.state"} & facts == {"pair"}:
         column.words = dict(zip(dict.fromkeys(cells), ("high", "low"), strict=True))
     return column
-
-
-def _heading_label(block: RowBlock, heading: Row | None, n: int, role: str) -> str:
-    """Return the gate or run of a column that its heading names, or a row above that.
-
-    Of merged cells only the first has a text. The last of them is as wide as the widest other: what
-    is beyond belongs to none.
-    """
-    labels = [find_label(heading.cell(n), role)] if heading else []
-    for row in block.headings:
-        if row is not heading:
-            grouped = [at for at, text in enumerate(row.texts) if find_label(text, role)]
-            width = max((b - a for a, b in itertools.pairwise(grouped)), default=0)
-            cells = reversed(row.texts[max(0, n + 1 - width) : n + 1])
-            labels.append(find_label(next(filter(None, cells), ""), role))
-    return next(filter(None, labels), "")
 
 
 def _facts_of_values(texts: Sequence[str]) -> set[str]:

@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from rig.errors import InputError
 from rig.reasons import Reason, make_reason
 from rig.records import Drop
@@ -213,22 +215,21 @@ def _refuse_impossible(reading: FileReading, place: str) -> None:
             if count >= min(len(moments), max(_FEWEST_SAME, 1 + len(moments) // 2)):
                 raise refusal(place, "same_twice", run=drop.run, other=run)
     # Of changes alone, two in a row mean that the row of the first is missing.
-    changes = Counter(zip(reading.line.tolist(), reading.tick, strict=True))
-    at_once = [line for (line, _), count in changes.items() if count > 1]
-    if at_once and file.period is None:  # regular samples see changes together
-        raise refusal(place, "at_once", lines=_some(at_once))
+    is_again = (np.diff(reading.line) == 0) & (np.diff(reading.tick) == 0)
+    if np.any(is_again) and file.period is None:  # regular samples see changes together
+        raise refusal(place, "at_once", lines=_some(reading.line[1:][is_again].tolist()))
 
 
 def _account(reading: FileReading, options: Namespace) -> Reason:
     """Say what became of every row; refuse rows that are not used."""
-    file, used = reading.file, set(reading.line)
+    file, edges = reading.file, Counter(reading.line.tolist())
     # A level that changes may be of an input that is no gate.
-    changed = file.changes[~file.changes["first"]]
-    left = set() if "sampled" in file.facts else (set(changed["line"]) - used) | reading.dropped
+    is_change = ~file.changes["first"] & ("sampled" not in file.facts)
+    left = Counter(file.changes["line"][is_change].tolist()) - edges
     unused = sorted({*file.unread, *left})
-    counts = {"runs": len(reading.runs), "rows": file.rows, "edges": len(reading.line)}
+    counts = {"runs": len(reading.runs), "rows": file.rows, "edges": edges.total()}
     if not unused:
-        return make_reason("rows_used", silent=file.rows - len(used), **counts)
+        return make_reason("rows_used", silent=file.rows - len(edges), **counts)
     rest = {"unused": len(unused), "lines": _some(unused)}
     if not options.allow_unused:
         raise refusal(options.events, "rows_unused", **counts, **rest)

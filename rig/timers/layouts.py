@@ -99,8 +99,6 @@ class FileReading:
         The edges of each run.
     firsts
         Inputs whose first row is a beam that is blocked, at the beginning or by a change.
-    dropped
-        Lines of changes at inputs that are no gate.
     line, tick, channel, blocked
         Of each edge: the line that it comes from, its time, ps, its gate, and the state after it.
     renamed
@@ -132,7 +130,6 @@ class FileReading:
         self.firsts = [names[n] for n in np.unique(changes["label"][is_odd])]
         is_change = ~changes["first"] | (blocked & (is_late | (layout.first == "change")))
         is_edge = is_change & (channel >= 0)
-        self.dropped = {*changes["line"][is_change & ~is_edge].tolist()}
         _, first, places = np.unique(drop[is_edge], return_index=True, return_inverse=True)
         name = changes["run"][is_edge][first]
         runs = np.array([-1 if (n := number_of(x)) is None else n for x in names])[name]

@@ -132,6 +132,15 @@ class Row(NamedTuple):
         """Return what a column, from 0, has; nothing where the row has no such."""
         return self.texts[at] if 0 <= at < len(self.texts) else ""
 
+    def cell_over(self, at: int) -> str:
+        """Return what stands over a column: of merged cells only the first has a text.
+
+        The last of them is as wide as the widest other; what is beyond belongs to none.
+        """
+        filled = [n for n, text in enumerate(self.texts) if text]
+        width = max((b - a for a, b in itertools.pairwise(filled)), default=1)
+        return next(filter(None, self.texts[max(0, at + 1 - width) : at + 1][::-1]), "")
+
     def count_known(self, columns: Collection[int] | None = None) -> int:
         """Count the cells, of some columns or of all, that say what a column is."""
         texts = [text for n, text in enumerate(self.texts) if columns is None or n in columns]
@@ -322,8 +331,7 @@ def find_separator(lines: Sequence[str], named: int) -> str:
     if 2 * len(numbers) > len(rows) and not is_named and sorted(numbers, key=float) == numbers:
         return ";"  # times go on with decimal commas; 0,25 below 1,5 is no decimal comma
     counts = {"": (named, 0)} if named else {}
-    marks = [mark for mark in "\t;|" if 2 * sum(mark in row for row in rows) > len(rows)]
-    for mark in marks or ", ":
+    for mark in ",\t;| ":
         cells = [kinds_of(text) for row in rows for text in split_cells(row, mark) if text]
         counts[mark] = 2 * sum(map(bool, cells)) - len(cells), len(cells)
     return max(counts, key=counts.__getitem__)
