@@ -138,7 +138,7 @@ class Row(NamedTuple):
         The last of them is as wide as the widest other; what is beyond belongs to none.
         """
         filled = [n for n, text in enumerate(self.texts) if text]
-        width = max((b - a for a, b in itertools.pairwise(filled)), default=1)
+        width = max((b - a for a, b in itertools.pairwise(filled)), default=0)
         return next(filter(None, self.texts[max(0, at + 1 - width) : at + 1][::-1]), "")
 
     def count_known(self, columns: Collection[int] | None = None) -> int:
