@@ -115,7 +115,7 @@ def columns_of(
     Raises
     ------
     InputError
-        Columns of which none has times, or that are called as a setting is.
+        Columns that are called as a setting is.
     """
     if width > _WIDEST:
         file.problems.refuse(rows[0].line, "too_many_columns", columns=width, limit=_WIDEST)
@@ -125,10 +125,9 @@ def columns_of(
     is_counted = facts.keys() >= {0, width - 1} and "counts" in facts[0]
     if heading and is_counted and len(heading.texts) < width:
         heading = heading._replace(texts=["", *heading.texts])  # numbers of rows have no name
-    shared = {f"table.{fact}" for fact in set().union(*facts.values())}
-    states = sum("all.state" in fact for fact in facts.values())
-    shared |= {f"columns.{min(len(facts), _MANY)}", f"states.{min(states, _MANY)}"}
-    shared |= _held({"rated": block.find_time_base()[1]})
+    held = Counter(itertools.chain(*facts.values()))
+    shared = {f"table.{fact}" for fact in held} | _held({"rated": block.find_time_base()[1]})
+    shared |= {f"columns.{min(len(facts), _MANY)}", f"states.{min(held['all.state'], _MANY)}"}
     columns = [_read_column(block, heading, n, facts[n] | shared, cells[n]) for n in facts]
     for column in columns:
         column.filled = len(cells[column.at]) / len(rows)
@@ -145,10 +144,6 @@ def columns_of(
             accepted = roles()["setting"][1]
             file.problems.reject(*above.place(column.at), "heading", column.name, accepted)
     file.problems.raise_if_any()
-    if {column.role for column in columns}.isdisjoint({"time", *SAMPLED}):
-        durations = ", ".join(repr(column.name) for column in columns if column.role == "duration")
-        code = "durations" if durations else "no_time_column"
-        file.problems.refuse(above.line, code, numbers=durations)
     return columns
 
 
@@ -189,8 +184,8 @@ def _read_column(
         column.run, name = column.run or prefix.strip(), rest
     bare = vocabulary.without_accents(name).replace(column.run, "")
     # Units stand in the heading, or in the row above the data.
-    last = (row.cell(n) for row in block.headings[-1:] if heading and row.line > heading.line)
-    units = list(map(unit_of, (bare, *last, *cells[: "all.timed" in facts])))
+    last = [row.cell(n) for row in block.headings[-1:] if heading and row.line > heading.line]
+    units = [*map(unit_of, [bare, *last, *cells[: "all.timed" in facts]])]
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
     unit = "" if find_label(unit, "gate") else unit
     is_numbers = form("row of numbers").fullmatch

@@ -99,7 +99,10 @@ class SignalReader:
         self.base, self.latest = block.find_time_base(), dict[int, int]()
         self.above = dict[str, str]()
         if self.clocks[0].role != "time" and not self.base[1]:
-            file.problems.refuse(sample[0].line, "no_rate", lacks="a column of times or a rate")
+            durations = ", ".join(repr(x.name) for x in columns if x.role == "duration")
+            values = {"numbers": durations, "lacks": "a column of times (s, ms, µs, ns) or a rate"}
+            line = (block.headings or sample)[0].line
+            file.problems.refuse(line, "durations" if durations else "no_rate", **values)
         used = {column.role: column for column in columns[::-1]}
         is_filled = 2 * sum(value.filled for _, value, _ in self.signals) > len(self.signals)
         has_volts = "volts" in used
