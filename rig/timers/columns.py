@@ -18,7 +18,16 @@ from rig.text_rows import read_rows
 from rig.timers import vocabulary
 from rig.timers.table import Row, RowBlock
 from rig.timers.timer_file import TimerFile
-from rig.timers.vocabulary import POWERS, find_label, form, is_number, normal, unit_of, words
+from rig.timers.vocabulary import (
+    POWERS,
+    find_label,
+    form,
+    is_measured,
+    is_number,
+    normal,
+    unit_of,
+    words,
+)
 
 SAMPLED = ("level", "volts")
 """Roles of samples: what an input was at a time, whether it changed then or not."""
@@ -121,11 +130,25 @@ def columns_of(
         file.problems.refuse(rows[0].line, "too_many_columns", columns=width, limit=_WIDEST)
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
     facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
+    held = Counter(itertools.chain(*facts.values()))
+    alike = {fact for fact in ("all.state", "climbs") if held[fact] > 1}
+    for n, texts in cells.items():
+        # Where others are alike, a broken cell does not make another kind of column.
+        values = [*filter(vocabulary.kinds_of, texts)]
+        if 2 * len(values) > len(texts) and alike & (held_by := _facts_of_values(values)):
+            facts[n] = held_by
     heading = block.find_heading(width, facts)
+    numbers = [n for n, text in enumerate(rows[0].texts) if is_measured(text)]
+    below = [row for row in block.headings if heading and row.line > heading.line]
+    for row in below if heading else block.headings[-1:]:
+        # What has half of a row's numbers is no heading, but a row of which nothing can be read.
+        count = sum(is_measured(row.cell(n)) for n in numbers)
+        if vocabulary.kinds_of(row.cell(0)) and 2 * count >= max(1, len(numbers)):
+            file.unread.append(row.line)
+            file.rows += 1
     is_counted = facts.keys() >= {0, width - 1} and "counts" in facts[0]
     if heading and is_counted and len(heading.texts) < width:
         heading = heading._replace(texts=["", *heading.texts])  # numbers of rows have no name
-    held = Counter(itertools.chain(*facts.values()))
     shared = {f"table.{fact}" for fact in held} | _held({"rated": block.find_time_base()[1]})
     shared |= {f"columns.{min(len(facts), _MANY)}", f"states.{min(held['all.state'], _MANY)}"}
     columns = [_read_column(block, heading, n, facts[n] | shared, cells[n]) for n in facts]

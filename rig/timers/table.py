@@ -20,6 +20,8 @@ from rig.timers.vocabulary import LONGEST, form, is_measured, is_number, kinds_o
 
 TimeBase = tuple[float, float]
 """When the first sample was taken, and the time between two, s."""
+_Shape = tuple[tuple[bool, bool], ...]
+"""Of each cell whether it is filled, and a number."""
 _Name = tuple[str, int]
 """Words before a value, and how many values with the same are before it in its line."""
 _UNFILLED = {"setting", "index", "derived"}
@@ -194,7 +196,7 @@ class Table:
         plain = [line for _, line in sample if line.strip() and not vocabulary.is_remark(line)]
         self._names, named = _find_names(plain)
         self.separator = find_separator(plain, named)
-        self._usual: tuple[tuple[bool, bool], ...] = ()
+        self._usual: _Shape = ()
         shapes = Counter(x for x in (_shape(self.split(y)) for y in plain) if any(map(all, x)))
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
@@ -206,7 +208,7 @@ class Table:
             # Names that come again are of another row, which may not be lost.
             again = [x for x in values.keys() - self._names if (x[0], 0) in self._names]
             return [values.get(x, "") for x in (*self._names, *again)] if values else [line]
-        cells = split_cells(line, self.separator, len(self._usual))
+        cells = split_cells(line, self.separator, self._usual)
         missing, has_comma = vocabulary.words()["missing"], form("decimal comma").fullmatch
         cells = ["" if text[:5].casefold() in missing else text for text in cells]
         return [text.replace(",", ".") if has_comma(text[:LONGEST]) else text for text in cells]
@@ -257,7 +259,7 @@ class Table:
 
     def _is_row(self, row: Row) -> bool:
         """Whether it has values only, and at least a number or a date, or looks as if it had."""
-        if _shape(row.texts) == self._usual:  # as most
+        if _begins_as(row.texts, self._usual):  # as most, perhaps with words behind
             return True
         # Above rows of several cells may stand a date, or a count.
         is_data = (len(row.texts) > 1 or len(self._usual) < 2) and any(map(is_measured, row.texts))
@@ -274,12 +276,12 @@ def _is_value(text: str) -> bool:
     return is_measured(text.removeprefix(vocabulary.find_label(text, "gate")).lstrip(":= "))
 
 
-def split_cells(line: str, separator: str, usual: int = 0) -> list[str]:
+def split_cells(line: str, separator: str, usual: _Shape = ()) -> list[str]:
     """Split a line into cells, without the blanks and the quotes around them."""
     if separator == " ":
         # A heading has names of several words: two blanks or more part them.
         cells = [word.strip('":') for word in line.split()]
-        is_row = len(cells) == usual or all(map(kinds_of, cells))
+        is_row = len(cells) == len(usual) or _begins_as(cells, usual) or all(map(kinds_of, cells))
         return cells if is_row else re.split(r" {2,}|\t", line.strip())
     if '"' in line:
         (cells,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
@@ -290,6 +292,7 @@ def split_cells(line: str, separator: str, usual: int = 0) -> list[str]:
 def _unwrap(line: str) -> list[str]:
     """Return a line without the brackets around it; lists in a line are lines of their own."""
     line = form("exponent of Fortran").sub("E", line) if "D" in line else line
+    line = form("remark behind").sub("", line) if "#" in line or "//" in line else line
     if line[:1].isdigit() or not form("list").match(line):
         return [line]
     pieces = form("between lists").split(line)
@@ -331,12 +334,18 @@ def find_separator(lines: Sequence[str], named: int) -> str:
     if 2 * len(numbers) > len(rows) and not is_named and sorted(numbers, key=float) == numbers:
         return ";"  # times go on with decimal commas; 0,25 below 1,5 is no decimal comma
     counts = {"": (named, 0)} if named else {}
-    for mark in ",\t;| ":
+    marks = [mark for mark in "\t;|" if 2 * sum(mark in row for row in rows) > len(rows)]
+    for mark in marks or ", ":
         cells = [kinds_of(text) for row in rows for text in split_cells(row, mark) if text]
         counts[mark] = 2 * sum(map(bool, cells)) - len(cells), len(cells)
     return max(counts, key=counts.__getitem__)
 
 
-def _shape(texts: Sequence[str]) -> tuple[tuple[bool, bool], ...]:
+def _begins_as(texts: Sequence[str], usual: _Shape) -> bool:
+    """Whether the first cells are as those of most rows."""
+    return 0 < len(usual) <= len(texts) and _shape(texts[: len(usual)]) == usual
+
+
+def _shape(texts: Sequence[str]) -> _Shape:
     """Return which cells are filled, and numbers; of most rows of data it is the same."""
     return tuple((text != "", is_measured(text)) for text in texts)

@@ -32,10 +32,10 @@ def vcd_rows(lines: Iterator[tuple[int, str]], problems: ProblemList) -> Iterato
                 levels |= changes
                 yield at, ",".join([time + unit, *levels.values()])
             at, time, changes = number, wire, {}
-        elif (wire in names or value in "01") and (
-            wire not in names or changes.setdefault(wire, value) != value
+        elif (wire in names and changes.setdefault(wire, value) != value) or (
+            wire not in names and (value in "01" or (value == "#" and wire))
         ):
-            accepted = "a wire that $var lists, with a single level at a time"
+            accepted = "a time, or a wire of $var with one level at each time"
             problems.reject(number, 1, names.get(wire, "wire"), word, accepted)
 
 
