@@ -93,14 +93,13 @@ class FileReading:
         Of the edges near a fall's, of all that came or were due, for it to be credible.
     runs
         Their numbers, in order.
-    places
-        Where the edges of each run begin, and where those of the last end.
     parts
         The edges of each run.
     firsts
         Inputs whose first row is a beam that is blocked, at the beginning or by a change.
-    line, tick, channel, blocked
-        Of each edge: the line that it comes from, its time, ps, its gate, and the state after it.
+    run, line, tick, channel, blocked
+        Of each edge: its run, the line that it comes from, its time, ps, its gate, and the state
+        after it.
     renamed
         Runs that the file calls otherwise: its name, and the number here.
     """
@@ -130,22 +129,22 @@ class FileReading:
         self.firsts = [names[n] for n in np.unique(changes["label"][is_odd])]
         is_change = ~changes["first"] | (blocked & (is_late | (layout.first == "change")))
         is_edge = is_change & (channel >= 0)
+        edges, channel, blocked = changes[is_edge], channel[is_edge], blocked[is_edge]
         _, first, places = np.unique(drop[is_edge], return_index=True, return_inverse=True)
-        name = changes["run"][is_edge][first]
-        runs = np.array([-1 if (n := number_of(x)) is None else n for x in names])[name]
+        called = [names[n] for n in edges["run"][first]]
+        numbers = list(map(number_of, called))
+        runs = np.array([-1 if n is None else n for n in numbers], dtype=int)
         runs += np.any(runs == 0)  # a file may count its runs from 0
         runs[(runs < 0) | (count_before(runs) > 0)] = 0
         free = np.setdiff1d(np.arange(1, 1 + 2 * len(runs)), runs)
         runs[runs == 0] = free[: np.sum(runs == 0)]
-        called = zip(map(names.__getitem__, name), runs.tolist(), strict=True)
-        self.renamed = {x or "one without a name": n for x, n in called if number_of(x) != n}
-        runs = runs[places]
-        order = np.flatnonzero(is_edge)[np.argsort(runs, kind="stable")]
-        self.line, self.tick = changes["line"][order], changes["tick"][order]
-        self.channel, self.blocked = channel[order], blocked[order]
-        runs, places = np.unique(np.sort(runs), return_index=True)
-        self.runs, self.places = runs.tolist(), np.append(places, len(order))
-        self.parts = [*map(slice, self.places, self.places[1:])]
+        rows = zip(called, numbers, runs.tolist(), strict=True)
+        self.renamed = {x or "one without a name": run for x, n, run in rows if run != n}
+        order = np.argsort(runs[places], kind="stable")
+        self.run, self.channel, self.blocked = runs[places][order], channel[order], blocked[order]
+        self.line, self.tick = edges["line"][order], edges["tick"][order]
+        runs, places = np.unique(self.run, return_index=True)
+        self.runs, self.parts = runs.tolist(), [*map(slice, places, [*places[1:], len(order)])]
 
     def drop(self, n: int) -> Drop:
         """Return the n-th drop."""
@@ -155,13 +154,13 @@ class FileReading:
     @property
     def lasting(self) -> list[int]:
         """How long each drop lasts, ps."""
-        return [*(self.tick[self.places[1:] - 1] - self.tick[self.places[:-1]])]
+        return [self.tick[part][-1] - self.tick[part][0] for part in self.parts]
 
     @property
     def key(self) -> int:
         """What is the same for readings of the same edges."""
-        columns = self.places, self.tick, self.channel, self.blocked
-        return hash((*self.runs, *(tuple(column.tolist()) for column in columns)))
+        columns = self.run, self.tick, self.channel, self.blocked
+        return hash(tuple(tuple(column.tolist()) for column in columns))
 
     @property
     def is_whole(self) -> bool:
@@ -169,8 +168,8 @@ class FileReading:
 
         Where the file says when they are blocked, it is not doubted.
         """
-        run = np.repeat(self.runs, np.diff(self.places)) * 100 + self.channel
-        _, first, counts = np.unique(run, return_index=True, return_counts=True)
+        beams = self.run * 100 + self.channel
+        _, first, counts = np.unique(beams, return_index=True, return_counts=True)
         if self.layout.dark.startswith("turns"):
             return not np.any(counts % 2)
         return self.layout.dark not in {"high", "low"} or bool(np.any(self.blocked[first]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import codecs
-import os
 from collections.abc import Generator
 from pathlib import Path
 
@@ -65,6 +64,6 @@ def read_lines(path: str | Path) -> Generator[str]:
 def is_cut(path: str | Path) -> bool:
     """Whether a file may end in the middle of its last number."""
     with Path(path).open("rb") as stream:
-        stream.seek(-min(_START, Path(path).stat().st_size), os.SEEK_END)
+        stream.seek(max(0, Path(path).stat().st_size - _START))
         *_, before, last = map(bytes.strip, [b"", *stream.read().replace(b"\0", b"").split(b"\n")])
     return 0 < len(last) < len(before)
