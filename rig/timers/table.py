@@ -159,6 +159,14 @@ class Row(NamedTuple):
         text = vocabulary.normal(" ".join(self.texts)).strip("-=*#:<>[] ")
         return form("mark").fullmatch(text) is not None
 
+    @property
+    def is_heading(self) -> bool:
+        """Whether it stands above its block again, or has no numbers and is known by half."""
+        return not any(map(is_number, self.texts)) and (
+            self.texts in [row.texts for row in self.block.headings]
+            or 0 < len(self.texts) <= 2 * self.count_known()
+        )
+
     def place(self, at: int) -> tuple[int, int]:
         """Return the line, and the column, from 1, at which a cell begins; 1 without the cell."""
         if at >= len(self.texts):
@@ -227,9 +235,10 @@ class Table:
             mark = form("remark").match(line[:LONGEST])
             text = line[mark.end() :].rstrip('" ') if mark else line
             row = Row(number, self.split(text), line, block)
-            if row.is_mark if mark or not block.width else self._begins_block(row):
-                block = self._next_block(block, line if row.is_mark else "")
-                block.headings += [] if row.is_mark else [row]
+            is_mark = not text[:1].isdigit() and row.is_mark
+            if is_mark or (block.width and not mark and row.is_heading):
+                block = self._next_block(block, line if is_mark else "")
+                block.headings += [] if is_mark else [row]
             elif mark:
                 self.remarks += [row] if number <= _SAMPLE else []
             elif not self.separator and len(row.texts) > len(self._names):
@@ -249,13 +258,6 @@ class Table:
         number = last.number + (not run and not gate)
         above = (last.headings if last.width else [*last.above, *last.headings])[:_SAMPLE]
         return RowBlock(self.remarks, above, number, run or last.run, gate or last.gate)
-
-    def _begins_block(self, row: Row) -> bool:
-        """Whether a row below others is a mark, or a heading, of further ones."""
-        if any(map(is_number, row.texts)):  # most are rows
-            return not row.raw[:1].isdigit() and row.is_mark
-        is_again = row.texts in [above.texts for above in row.block.headings]
-        return is_again or row.is_mark or 0 < len(row.texts) <= 2 * row.count_known()
 
     def _is_row(self, row: Row) -> bool:
         """Whether it has values only, and at least a number or a date, or looks as if it had."""
