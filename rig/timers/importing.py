@@ -164,8 +164,8 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
     """Return the reading that a fall of the protocol bears out, and how well.
 
     Where the user said which input is which gate, that reading, if there is no other, is taken
-    whatever falls say. The contrary of what the file says of beams may be proposed, and is never
-    taken.
+    whatever falls say. What contradicts the file is taken only where nothing else fits nearly as
+    well.
     """
     distinct = [*{x.key: x for x in reversed(readings)}.values()][::-1]
     if len(distinct) == 1 and "channels" in distinct[0].file.stated:
@@ -174,7 +174,6 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
     likely = [x for match, x in rough if match.share >= x.least_share]
     exact = [(fit(x, True), x) for x in likely[:_FINALISTS]]
     ranked = [row for row in exact if row[0].share >= row[1].least_share]
-    # What contradicts the file is taken only where nothing else fits nearly as well.
     ranked.sort(key=lambda row: _DECISIVE * row[1].layout.contradictions - row[0].evidence)
     if not ranked:
         match, best = (exact or rough)[0]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 from collections.abc import Generator
 from pathlib import Path
+from typing import Any
 
 from rig.files import require_file
 from rig.timers.problems import ProblemList, refusal
@@ -16,10 +17,8 @@ _START = 4096
 """Bytes that show the encoding, or that this is no text."""
 
 
-def _decode_as_windows(fault: UnicodeError) -> tuple[str, int]:
+def _decode_as_windows(fault: Any) -> tuple[str, int]:
     """Read bytes that are no UTF-8 as Windows writes them, wherever they stand."""
-    if not isinstance(fault, UnicodeDecodeError):
-        raise fault
     return fault.object[fault.start : fault.end].decode("cp1252", "replace"), fault.end
 
 
