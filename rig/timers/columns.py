@@ -18,16 +18,7 @@ from rig.text_rows import read_rows
 from rig.timers import vocabulary
 from rig.timers.table import Row, RowBlock
 from rig.timers.timer_file import TimerFile
-from rig.timers.vocabulary import (
-    POWERS,
-    find_label,
-    form,
-    is_measured,
-    is_number,
-    normal,
-    unit_of,
-    words,
-)
+from rig.timers.vocabulary import POWERS, find_label, form, is_measured, is_number, unit_of, words
 
 SAMPLED = ("level", "volts")
 """Roles of samples: what an input was at a time, whether it changed then or not."""
@@ -135,15 +126,15 @@ def columns_of(
     for n, texts in cells.items():
         # Where others are alike, a broken cell does not make another kind of column.
         values = [*filter(vocabulary.kinds_of, texts)]
-        if 2 * len(values) > len(texts) and alike & (held_by := _facts_of_values(values)):
-            facts[n] = held_by
+        if 2 * len(values) > len(texts) and alike & (like := _facts_of_values(values)):
+            facts[n] = like
     heading = block.find_heading(width, facts)
     numbers = [n for n, text in enumerate(rows[0].texts) if is_measured(text)]
     below = [row for row in block.headings if heading and row.line > heading.line]
     for row in below if heading else block.headings[-1:]:
         # What has half of a row's numbers is no heading, but a row of which nothing can be read.
         count = sum(is_measured(row.cell(n)) for n in numbers)
-        if vocabulary.kinds_of(row.cell(0)) and 2 * count >= max(1, len(numbers)):
+        if vocabulary.kinds_of(row.cell(0)) and 2 * count >= len(numbers) > 0:
             file.unread.append(row.line)
             file.rows += 1
     is_counted = facts.keys() >= {0, width - 1} and "counts" in facts[0]
@@ -216,7 +207,8 @@ def _read_column(
     column.gate = gate or next(numbers, "")
     roles_of_name = vocabulary.roles_in(bare)
     named = {
-        "time": unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"],
+        "time": unit in POWERS
+        and vocabulary.normal(name).strip("()[] ") in words()[f"unit {unit}"],
         "bare": not (roles_of_name - _NO_ROLES or unit or column.gate or column.run),
         "named": name,
         "first": not n,

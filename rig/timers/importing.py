@@ -123,12 +123,11 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
     notes += [*match.doubts, *_assumptions(reading, gates)]
     if options.map_file is not None and not Path(options.map_file).exists():
         Path(options.map_file).write_text(f"{reading.layout.text}\n", "utf-8")
-    pairs = [
-        f"input {x} is the gate at channel {n}" for x, n in reading.layout.channels.items() if x
-    ]
+    channels = reading.layout.channels
+    pairs = [f"input {x} is the gate at channel {n}" for x, n in channels.items() if x]
     lines = [*reading.file.lines, *pairs, str(reading.layout), *filter(None, [match.text])]
     drops = [*map(reading.drop, range(len(reading.runs)))]
-    return Import(drops, reading.layout.channels, lines, notes)
+    return Import(drops, channels, lines, notes)
 
 
 def _find_readings(options: Namespace, gates: Sequence[int], bars: int) -> list[FileReading]:

@@ -345,7 +345,7 @@ def find_separator(lines: Sequence[str], named: int) -> str:
 
 def _begins_as(texts: Sequence[str], usual: _Shape) -> bool:
     """Whether the first cells are as those of most rows."""
-    return 0 < len(usual) <= len(texts) and _shape(texts[: len(usual)]) == usual
+    return usual != () and _shape(texts[: len(usual)]) == usual
 
 
 def _shape(texts: Sequence[str]) -> _Shape:
