@@ -88,8 +88,8 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
     rate = TimeScale(TICK_HZ, RESONATOR_TOLERANCE)
     most = None if exact else _COMPARED
     compared = [n for n, run in enumerate(reading.runs) if run in planned][:most]
-    places, lasting = reading.places, reading.lasting
-    order = sorted(compared, key=lambda n: (places[n + 1] - places[n], lasting[n]))
+    parts, lasting = reading.parts, reading.lasting
+    order = sorted(compared, key=lambda n: (parts[n].stop - parts[n].start, lasting[n]))
     for n in sorted({*order[:: 1 + len(order) // _MOST], *order[-1:]}):
         run, drop = planned[reading.runs[n]], reading.drop(n)
         records = chain_records(protocol.of(run), run, drop, TICK_HZ)

@@ -18,7 +18,7 @@ from rig.text_rows import read_rows
 from rig.timers import vocabulary
 from rig.timers.table import Row, RowBlock
 from rig.timers.timer_file import TimerFile
-from rig.timers.vocabulary import POWERS, find_label, form, is_number, normal, unit_of, words
+from rig.timers.vocabulary import POWERS, find_label, form, is_measured, is_number, unit_of, words
 
 SAMPLED = ("level", "volts")
 """Roles of samples: what an input was at a time, whether it changed then or not."""
@@ -59,6 +59,8 @@ class TimerColumn:
         ``blocked`` or ``clear`` where the heading says what all its times did to the beam.
     words
         What two unknown words mean, for which falls decide: the one that begins is ``high``.
+    filled
+        Share of the first rows that have a value.
     """
 
     at: int
@@ -69,6 +71,7 @@ class TimerColumn:
     run: str = ""
     state: str = ""
     words: Mapping[str, str] = field(default_factory=dict)
+    filled: float = 0.0
 
     def __str__(self) -> str:
         meaning = " or ".join(roles()[role][0] for role in self.role.split("|"))
@@ -112,21 +115,36 @@ def columns_of(
     Raises
     ------
     InputError
-        Columns of which none has times, or that are called as a setting is.
+        Columns that are called as a setting is.
     """
     if width > _WIDEST:
         file.problems.refuse(rows[0].line, "too_many_columns", columns=width, limit=_WIDEST)
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
     facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
+    held = Counter(itertools.chain(*facts.values()))
+    alike = {fact for fact in ("all.state", "climbs") if held[fact] > 1}
+    for n, texts in cells.items():
+        # Where others are alike, a broken cell does not make another kind of column.
+        values = [*filter(vocabulary.kinds_of, texts)]
+        if 2 * len(values) > len(texts) and alike & (like := _facts_of_values(values)):
+            facts[n] = like
     heading = block.find_heading(width, facts)
+    numbers = [n for n, text in enumerate(rows[0].texts) if is_measured(text)]
+    below = [row for row in block.headings if heading and row.line > heading.line]
+    for row in below if heading else block.headings[-1:]:
+        # What has half of a row's numbers is no heading, but a row of which nothing can be read.
+        count = sum(is_measured(row.cell(n)) for n in numbers)
+        if vocabulary.kinds_of(row.cell(0)) and 2 * count >= len(numbers) > 0:
+            file.unread.append(row.line)
+            file.rows += 1
     is_counted = facts.keys() >= {0, width - 1} and "counts" in facts[0]
     if heading and is_counted and len(heading.texts) < width:
         heading = heading._replace(texts=["", *heading.texts])  # numbers of rows have no name
-    shared = {f"table.{fact}" for fact in set().union(*facts.values())}
-    states = sum("all.state" in fact for fact in facts.values())
-    shared |= {f"columns.{min(len(facts), _MANY)}", f"states.{min(states, _MANY)}"}
-    shared |= _held({"rated": block.find_time_base()})
+    shared = {f"table.{fact}" for fact in held} | _held({"rated": block.find_time_base()[1]})
+    shared |= {f"columns.{min(len(facts), _MANY)}", f"states.{min(held['all.state'], _MANY)}"}
     columns = [_read_column(block, heading, n, facts[n] | shared, cells[n]) for n in facts]
+    for column in columns:
+        column.filled = len(cells[column.at]) / len(rows)
     if heading is None:
         if any(row.count_known() > 1 and len(row.texts) > width for row in block.headings):
             file.problems.refuse(block.headings[0].line, "heading_unfit", columns=width)
@@ -140,10 +158,6 @@ def columns_of(
             accepted = roles()["setting"][1]
             file.problems.reject(*above.place(column.at), "heading", column.name, accepted)
     file.problems.raise_if_any()
-    if {column.role for column in columns}.isdisjoint({"time", *SAMPLED}):
-        durations = ", ".join(repr(column.name) for column in columns if column.role == "duration")
-        code = "durations" if durations else "no_time_column"
-        file.problems.refuse(above.line, code, numbers=durations)
     return columns
 
 
@@ -176,22 +190,25 @@ def _read_column(
 ) -> TimerColumn:
     """Find out what a column is; the row below its heading, or its cells, may say the unit."""
     name = heading.cell(n) if heading else ""
-    column = TimerColumn(n, name or f"column {n + 1}", run=_heading_label(block, heading, n, "run"))
+    above = [name, *(row.cell_over(n) for row in block.headings if row is not heading)]
+    run, gate = (next(filter(None, [find_label(x, y) for x in above]), "") for y in ("run", "gate"))
+    column = TimerColumn(n, name or f"column {n + 1}", run=run)
     prefix, _, rest = name.partition(":")
     if rest.strip() and not find_label(prefix, "gate"):
         column.run, name = column.run or prefix.strip(), rest
     bare = vocabulary.without_accents(name).replace(column.run, "")
     # Units stand in the heading, or in the row above the data.
-    last = (row.cell(n) for row in block.headings[-1:] if heading and row.line > heading.line)
-    units = list(map(unit_of, (bare, *last, *cells[: "all.timed" in facts])))
+    last = [row.cell(n) for row in block.headings[-1:] if heading and row.line > heading.line]
+    units = [*map(unit_of, [bare, *last, *cells[: "all.timed" in facts]])]
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
     unit = "" if find_label(unit, "gate") else unit
     is_numbers = form("row of numbers").fullmatch
     numbers = (row.cell(n) for row in block.headings if is_numbers(row.raw))
-    column.gate = _heading_label(block, heading, n, "gate") or next(numbers, "")
+    column.gate = gate or next(numbers, "")
     roles_of_name = vocabulary.roles_in(bare)
     named = {
-        "time": unit in POWERS and normal(name).strip("()[] ") in words()[f"unit {unit}"],
+        "time": unit in POWERS
+        and vocabulary.normal(name).strip("()[] ") in words()[f"unit {unit}"],
         "bare": not (roles_of_name - _NO_ROLES or unit or column.gate or column.run),
         "named": name,
         "first": not n,
@@ -211,22 +228,6 @@ def _read_column(
     if column.role == "edge" and {"pair", "all.state"} & facts == {"pair"}:
         column.words = dict(zip(dict.fromkeys(cells), ("high", "low"), strict=True))
     return column
-
-
-def _heading_label(block: RowBlock, heading: Row | None, n: int, role: str) -> str:
-    """Return the gate or run of a column that its heading names, or a row above that.
-
-    Of merged cells only the first has a text. The last of them is as wide as the widest other: what
-    is beyond belongs to none.
-    """
-    labels = [find_label(heading.cell(n), role)] if heading else []
-    for row in block.headings:
-        if row is not heading:
-            grouped = [at for at, text in enumerate(row.texts) if find_label(text, role)]
-            width = max((b - a for a, b in itertools.pairwise(grouped)), default=0)
-            cells = reversed(row.texts[max(0, n + 1 - width) : n + 1])
-            labels.append(find_label(next(filter(None, cells), ""), role))
-    return next(filter(None, labels), "")
 
 
 def _facts_of_values(texts: Sequence[str]) -> set[str]:

@@ -18,8 +18,8 @@ _SCATTER = 1.4826
 """Standard deviation over the median of absolute deviations, of normal noise."""
 
 
-def find_crossings(samples: Array, threshold: tuple[float, float]) -> Array:
-    """Return where volts cross a threshold, with 1 where they rise and 0 where they fall.
+def find_crossings(samples: Array) -> tuple[float | None, Array]:
+    """Return the middle between two levels of volts, and where they cross it.
 
     Parameters
     ----------
@@ -28,29 +28,27 @@ def find_crossings(samples: Array, threshold: tuple[float, float]) -> Array:
 
     Returns
     -------
-    array
-        Of each crossing the line of the sample behind it, its moment, and the level that begins.
+    middle
+        `None` without two levels.
+    crossings
+        Of each the line of the sample behind it, its moment, and 1 where volts rise.
     """
     lines, times, volts = samples.T
-    is_high = volts > threshold[0]
-    sure = np.flatnonzero(np.abs(volts - threshold[0]) > threshold[1])
-    turns = sure[1:][is_high[sure[1:]] != is_high[sure[:-1]]]
-    crossings = np.flatnonzero(is_high[1:] != is_high[:-1]) + 1
-    at = crossings[np.searchsorted(crossings, turns, side="right") - 1]
-    share = (volts[at] - threshold[0]) / (volts[at] - volts[at - 1])
-    return np.array([lines[at], times[at] - share * (times[at] - times[at - 1]), is_high[at]]).T
-
-
-def find_threshold(volts: Array) -> tuple[float, float] | None:
-    """Return the middle between two levels, and half the hysteresis; `None` without two levels."""
-    low, high = float(volts.min(initial=np.inf)), float(volts.max(initial=-np.inf))
+    low, high = volts.min(initial=np.inf), volts.max(initial=-np.inf)
     for _ in range(10):  # two means, one for each level: of two levels, two or three are enough
         above = volts > 0.5 * (low + high)
         if above.all() or not above.any():
-            return None
-        low, high = float(np.median(volts[~above])), float(np.median(volts[above]))
-    levels = (above, high), (~above, low)
-    noise = max(float(np.median(np.abs(volts[side] - level))) for side, level in levels)
+            return None, samples[:0]
+        low, high = np.median(volts[~above]), np.median(volts[above])
+    noise = max(np.median(np.abs(volts[~above] - low)), np.median(np.abs(volts[above] - high)))
     if high - low < _CLEAR_SWING * _SCATTER * noise:
-        return None
-    return 0.5 * (low + high), 0.5 * _HYSTERESIS * (high - low)
+        return None, samples[:0]
+    middle = float(0.5 * (low + high))
+    is_high = volts > middle
+    sure = np.flatnonzero(np.abs(volts - middle) > 0.5 * _HYSTERESIS * (high - low))
+    turns = sure[1:][np.diff(is_high[sure])]
+    crossings = np.flatnonzero(np.diff(is_high)) + 1
+    at = crossings[np.searchsorted(crossings, turns, side="right") - 1]
+    share = (volts[at] - middle) / (volts[at] - volts[at - 1])
+    moments = times[at] - share * (times[at] - times[at - 1])
+    return middle, np.stack([lines[at], moments, is_high[at]], axis=1)

@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from rig.errors import InputError
 from rig.reasons import Reason, make_reason
 from rig.records import Drop
@@ -121,12 +123,11 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
     notes += [*match.doubts, *_assumptions(reading, gates)]
     if options.map_file is not None and not Path(options.map_file).exists():
         Path(options.map_file).write_text(f"{reading.layout.text}\n", "utf-8")
-    pairs = [
-        f"input {x} is the gate at channel {n}" for x, n in reading.layout.channels.items() if x
-    ]
+    channels = reading.layout.channels
+    pairs = [f"input {x} is the gate at channel {n}" for x, n in channels.items() if x]
     lines = [*reading.file.lines, *pairs, str(reading.layout), *filter(None, [match.text])]
     drops = [*map(reading.drop, range(len(reading.runs)))]
-    return Import(drops, reading.layout.channels, lines, notes)
+    return Import(drops, channels, lines, notes)
 
 
 def _find_readings(options: Namespace, gates: Sequence[int], bars: int) -> list[FileReading]:
@@ -162,8 +163,8 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
     """Return the reading that a fall of the protocol bears out, and how well.
 
     Where the user said which input is which gate, that reading, if there is no other, is taken
-    whatever falls say. The contrary of what the file says of beams may be proposed, and is never
-    taken.
+    whatever falls say. What contradicts the file is taken only where nothing else fits nearly as
+    well.
     """
     distinct = [*{x.key: x for x in reversed(readings)}.values()][::-1]
     if len(distinct) == 1 and "channels" in distinct[0].file.stated:
@@ -172,10 +173,7 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
     likely = [x for match, x in rough if match.share >= x.least_share]
     exact = [(fit(x, True), x) for x in likely[:_FINALISTS]]
     ranked = [row for row in exact if row[0].share >= row[1].least_share]
-    if "dark" not in distinct[0].file.stated:
-        ranked = [row for row in ranked if row[1].layout.dark != "inverted"]
-    # The first row of a log of changes is the state at the beginning, unless falls say that.
-    ranked.sort(key=lambda row: _DECISIVE * (row[1].layout.first == "change") - row[0].evidence)
+    ranked.sort(key=lambda row: _DECISIVE * row[1].layout.contradictions - row[0].evidence)
     if not ranked:
         match, best = (exact or rough)[0]
         is_open = [x for _, x in rough if x.layout.dark not in {"states", "inverted"}]
@@ -185,7 +183,7 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
         line = best.line[best.parts[match.worst]].min()
         raise refusal(f"{place}:{line}:1", "no_reading_fits", **values)
     (match, reading), *rest = ranked
-    rivals = [row for row in rest if row[1].layout.first == reading.layout.first]
+    rivals = [x for x in rest if x[1].layout.contradictions == reading.layout.contradictions]
     if rivals and match.evidence - rivals[0][0].evidence < _DECISIVE:
         options = f"{reading.layout} or {rivals[0][1].layout}"
         raise refusal(place, "several_readings", options=options)
@@ -215,22 +213,21 @@ def _refuse_impossible(reading: FileReading, place: str) -> None:
             if count >= min(len(moments), max(_FEWEST_SAME, 1 + len(moments) // 2)):
                 raise refusal(place, "same_twice", run=drop.run, other=run)
     # Of changes alone, two in a row mean that the row of the first is missing.
-    changes = Counter(zip(reading.line.tolist(), reading.tick, strict=True))
-    at_once = [line for (line, _), count in changes.items() if count > 1]
-    if at_once and file.period is None:  # regular samples see changes together
-        raise refusal(place, "at_once", lines=_some(at_once))
+    is_again = (np.diff(reading.line) == 0) & (np.diff(reading.tick) == 0)
+    if np.any(is_again) and file.period is None:  # regular samples see changes together
+        raise refusal(place, "at_once", lines=_some(reading.line[1:][is_again].tolist()))
 
 
 def _account(reading: FileReading, options: Namespace) -> Reason:
     """Say what became of every row; refuse rows that are not used."""
-    file, used = reading.file, set(reading.line)
+    file, edges = reading.file, Counter(reading.line.tolist())
     # A level that changes may be of an input that is no gate.
-    changed = file.changes[~file.changes["first"]]
-    left = set() if "sampled" in file.facts else (set(changed["line"]) - used) | reading.dropped
+    is_change = ~file.changes["first"] & ("sampled" not in file.facts)
+    left = Counter(file.changes["line"][is_change].tolist()) - edges
     unused = sorted({*file.unread, *left})
-    counts = {"runs": len(reading.runs), "rows": file.rows, "edges": len(reading.line)}
+    counts = {"runs": len(reading.runs), "rows": file.rows, "edges": edges.total()}
     if not unused:
-        return make_reason("rows_used", silent=file.rows - len(used), **counts)
+        return make_reason("rows_used", silent=file.rows - len(edges), **counts)
     rest = {"unused": len(unused), "lines": _some(unused)}
     if not options.allow_unused:
         raise refusal(options.events, "rows_unused", **counts, **rest)
@@ -256,6 +253,8 @@ def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]
         yield make_reason("gates_absent", channels=", ".join(absent))
     if opposite := {"high": "low", "low": "high"}.get(layout.dark):
         yield make_reason("blocked_level", level=layout.dark, other=opposite)
+    if layout.dark == "inverted":
+        yield make_reason("states_inverted")
     if reading.firsts:
         code = "first_row" if layout.first == "change" else "first_unknown"
         yield make_reason(code, input=", ".join(reading.firsts))
@@ -269,36 +268,33 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
 
     Each is what a dry run prints: settings, and the gate's channel of each input.
     """
-    saved, labels, stated = Path(options.map_file or ""), file.labels or [""], dict[str, Any]()
-    texts = {options.map_file: next(read_lines(saved), "")} if saved.is_file() else {}
-    names = {"dark": "dark", "unit": "unit", "channel": labels[0] or "input"}
+    saved, labels = Path(options.map_file or ""), file.labels or [""]
     if options.channel is not None and len(labels) > 1:
         raise refusal("--channel", "inputs_several", inputs=", ".join(labels))
+    begins = {"dark": "dark=", "unit": "unit=", "channel": f"{labels[0] or 'input'}=", "map": ""}
+    texts = {options.map_file: next(read_lines(saved), "")} if saved.is_file() else {}
     texts |= {
-        f"--{option}": f"{name}={value}"
-        for option, name in names.items()
-        if (value := getattr(options, option)) is not None
+        f"--{name}": f"{begin}{value}"
+        for name, begin in begins.items()
+        if (value := getattr(options, name)) is not None
     }
-    texts |= {"--map": options.map} if options.map is not None else {}
     settings = {*SETTINGS}.difference(labels)
-    for place, text in texts.items():
-        channels, pairs = dict[str, int](), dict(form("assigned").findall(text) or [(text, "")])
-        groups = pairs.get("groups", stated.get("groups"))
-        inputs = {x or "input": x for x in input_names(file, groups, gates)}
-        for name, value in pairs.items():
-            if name in settings and form(f"setting {name}").fullmatch(value):
-                stated[name] = value
-                if name == "unit" and {None, POWERS[value]}.isdisjoint(file.powers):
-                    units = " and ".join(sorted(SYMBOLS[power] for power in file.powers)) or "s"
-                    raise refusal(place, "unit_contradicts", unit=value, units=units)
-            elif name in settings:
-                raise refusal(place, "layout_unclear", text=f"{name}={value:.40}")
-            elif name not in inputs:
-                raise refusal(place, "input_unknown", text=name, inputs=", ".join(inputs))
-            elif value in map(str, gates):
-                channels[inputs[name]] = int(value)
-            else:
-                accepted = f"INPUT=CHANNEL with a gate's channel: {', '.join(map(str, gates))}"
-                raise refusal(place, "not_accepted", text=f"{name}={value}", accepted=accepted)
-        stated |= {"channels": channels} if channels else {}
-    return stated
+    pairs = form("assigned").findall
+    rows = [(x, *y) for x, text in texts.items() for y in pairs(text) or [(text, "")]]
+    stated: dict[str, Any] = {name: value for _, name, value in rows if name in settings}
+    inputs = {x or "input": x for x in input_names(file, stated.get("groups"), gates)}
+    channels = dict[str, int]()
+    for place, name, value in rows:
+        if name in inputs and value in map(str, gates):
+            channels[inputs[name]] = int(value)
+        elif name in inputs:
+            accepted = f"INPUT=CHANNEL with a gate's channel: {', '.join(map(str, gates))}"
+            raise refusal(place, "not_accepted", text=f"{name}={value}", accepted=accepted)
+        elif name not in settings:
+            raise refusal(place, "input_unknown", text=name, inputs=", ".join(inputs))
+        elif not form(f"setting {name}").fullmatch(value):
+            raise refusal(place, "layout_unclear", text=f"{name}={value:.40}")
+        elif name == "unit" and {None, POWERS[value]}.isdisjoint(file.powers):
+            units = " and ".join(sorted(SYMBOLS[power] for power in file.powers)) or "s"
+            raise refusal(place, "unit_contradicts", unit=value, units=units)
+    return stated | ({"channels": channels} if channels else {})

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -32,12 +32,8 @@ _MOST_MAPS = 200
 _FEWEST = 3
 """Changes of a drop that tell which gate it passed: two are near those of falls past several."""
 
-SETTINGS = ("unit", "dark", "groups", "first", "pause_s")
-"""What a layout has beside its inputs; `forms.txt` says what each may be."""
 
-
-@dataclass(frozen=True, slots=True)
-class FileLayout:
+class FileLayout(NamedTuple):
     """What a file leaves open.
 
     Attributes
@@ -66,18 +62,26 @@ class FileLayout:
     groups: str = "runs"
     first: str = "state"
     pause_s: float = 0.0
-    channels: Mapping[str, int] = field(default_factory=dict)
+    channels: Mapping[str, int] = MappingProxyType({})
+
+    @property
+    def contradictions(self) -> int:
+        """Count what is contrary to what the file says, or to what its first rows usually say."""
+        return (self.dark == "inverted") + (self.first == "change")
 
     @property
     def text(self) -> str:
         """What ``--map`` accepts."""
-        usual = FileLayout()
-        pairs = [(x, getattr(self, x)) for x in SETTINGS if getattr(self, x) != getattr(usual, x)]
-        pairs += [(x or "input", channel) for x, channel in self.channels.items()]
-        return ",".join(f"{name}={value}" for name, value in pairs)
+        settings = zip(SETTINGS, self, FileLayout(), strict=False)
+        pairs = [f"{name}={value}" for name, value, usual in settings if value != usual]
+        return ",".join([*pairs, *(f"{x or 'input'}={n}" for x, n in self.channels.items())])
 
     def __str__(self) -> str:
         return f"--map '{self.text}'"
+
+
+SETTINGS = FileLayout._fields[:-1]
+"""What a layout has beside its inputs; `forms.txt` says what each may be."""
 
 
 class FileReading:
@@ -89,16 +93,13 @@ class FileReading:
         Of the edges near a fall's, of all that came or were due, for it to be credible.
     runs
         Their numbers, in order.
-    places
-        Where the edges of each run begin, and where those of the last end.
     parts
         The edges of each run.
     firsts
         Inputs whose first row is a beam that is blocked, at the beginning or by a change.
-    dropped
-        Lines of changes at inputs that are no gate.
-    line, tick, channel, blocked
-        Of each edge: the line that it comes from, its time, ps, its gate, and the state after it.
+    run, line, tick, channel, blocked
+        Of each edge: its run, the line that it comes from, its time, ps, its gate, and the state
+        after it.
     renamed
         Runs that the file calls otherwise: its name, and the number here.
     """
@@ -115,11 +116,10 @@ class FileReading:
             share = np.maximum(1, np.bincount(drop)[drop] // len(channels))
             label = np.minimum(count_before(drop) // share, len(channels) - 1)
         channel, state = np.array(channels)[label], changes["state"]
-        is_stated = np.isin(state, (STATES.index("blocked"), STATES.index("high")))
         is_first = count_before(drop * (1 + len(channels)) + label) % 2 == 0
         blocked = np.where(
             state > 0,
-            is_stated ^ (layout.dark in {"inverted", "low"}),
+            (state % 2 == 0) ^ (layout.dark in {"inverted", "low"}),
             is_first ^ (layout.dark == "turns-clear") | (layout.dark == "each"),
         )
         # A beam is clear at the beginning; a first row that says so changes nothing.
@@ -129,23 +129,22 @@ class FileReading:
         self.firsts = [names[n] for n in np.unique(changes["label"][is_odd])]
         is_change = ~changes["first"] | (blocked & (is_late | (layout.first == "change")))
         is_edge = is_change & (channel >= 0)
-        self.dropped = {*changes["line"][is_change & ~is_edge].tolist()}
+        edges, channel, blocked = changes[is_edge], channel[is_edge], blocked[is_edge]
         _, first, places = np.unique(drop[is_edge], return_index=True, return_inverse=True)
-        name = changes["run"][is_edge][first]
-        runs = np.array([-1 if (n := number_of(x)) is None else n for x in names])[name]
+        called = [names[n] for n in edges["run"][first]]
+        numbers = list(map(number_of, called))
+        runs = np.array([-1 if n is None else n for n in numbers], dtype=int)
         runs += np.any(runs == 0)  # a file may count its runs from 0
         runs[(runs < 0) | (count_before(runs) > 0)] = 0
         free = np.setdiff1d(np.arange(1, 1 + 2 * len(runs)), runs)
         runs[runs == 0] = free[: np.sum(runs == 0)]
-        called = zip(map(names.__getitem__, name), runs.tolist(), strict=True)
-        self.renamed = {x or "one without a name": n for x, n in called if number_of(x) != n}
-        runs = runs[places]
-        order = np.flatnonzero(is_edge)[np.argsort(runs, kind="stable")]
-        self.line, self.tick = changes["line"][order], changes["tick"][order]
-        self.channel, self.blocked = channel[order], blocked[order]
-        runs, places = np.unique(np.sort(runs), return_index=True)
-        self.runs, self.places = runs.tolist(), np.append(places, len(order))
-        self.parts = [*map(slice, self.places, self.places[1:])]
+        rows = zip(called, numbers, runs.tolist(), strict=True)
+        self.renamed = {x or "one without a name": run for x, n, run in rows if run != n}
+        order = np.argsort(runs[places], kind="stable")
+        self.run, self.channel, self.blocked = runs[places][order], channel[order], blocked[order]
+        self.line, self.tick = edges["line"][order], edges["tick"][order]
+        runs, places = np.unique(self.run, return_index=True)
+        self.runs, self.parts = runs.tolist(), [*map(slice, places, [*places[1:], len(order)])]
 
     def drop(self, n: int) -> Drop:
         """Return the n-th drop."""
@@ -155,13 +154,13 @@ class FileReading:
     @property
     def lasting(self) -> list[int]:
         """How long each drop lasts, ps."""
-        return [*(self.tick[self.places[1:] - 1] - self.tick[self.places[:-1]])]
+        return [self.tick[part][-1] - self.tick[part][0] for part in self.parts]
 
     @property
     def key(self) -> int:
         """What is the same for readings of the same edges."""
-        columns = self.places, self.tick, self.channel, self.blocked
-        return hash((*self.runs, *(tuple(column.tolist()) for column in columns)))
+        columns = self.run, self.tick, self.channel, self.blocked
+        return hash(tuple(tuple(column.tolist()) for column in columns))
 
     @property
     def is_whole(self) -> bool:
@@ -169,8 +168,8 @@ class FileReading:
 
         Where the file says when they are blocked, it is not doubted.
         """
-        run = np.repeat(self.runs, np.diff(self.places)) * 100 + self.channel
-        _, first, counts = np.unique(run, return_index=True, return_counts=True)
+        beams = self.run * 100 + self.channel
+        _, first, counts = np.unique(beams, return_index=True, return_counts=True)
         if self.layout.dark.startswith("turns"):
             return not np.any(counts % 2)
         return self.layout.dark not in {"high", "low"} or bool(np.any(self.blocked[first]))
@@ -182,17 +181,17 @@ def group_changes(file: TimerFile, unit: str, groups: str, pause: float) -> tupl
 
     In a file that says the drops, they are parted by no time; in others where times begin anew.
     """
-    changes, rank = file.changes, file.changes["rank"]
+    changes, tick = file.changes, file.changes["tick"]
     part = changes[{"rows": "line", "columns": "clock"}.get(groups, "run")]
     keys = np.stack([changes["block"] * ("run" not in file.facts), changes["run"], part])
-    order = np.lexsort((rank, changes["line"], *keys[::-1]))
+    order = np.lexsort((tick, changes["line"], *keys[::-1]))
     is_new = np.any(np.diff(keys[:, order], prepend=-1) != 0, axis=0)
     if file.is_stacked and groups in {"runs", "passing"}:
-        is_new |= np.diff(rank[order], prepend=0) < 0
+        is_new |= np.diff(tick[order], prepend=0) < 0
     drop = np.cumsum(is_new)
-    order = order[np.lexsort((rank[order], drop))]
+    order = order[np.lexsort((tick[order], drop))]
     # Nothing does the same twice at once.
-    same = np.stack([drop, *(changes[name][order] for name in ("rank", "label", "state"))])
+    same = np.stack([drop, *(changes[name][order] for name in ("tick", "label", "state"))])
     is_other = np.any(np.diff(same, prepend=-1) != 0, axis=0)
     changes, drops = changes[order][is_other], drop[is_other].astype(np.intp) - 1
     changes["tick"] //= 10 ** POWERS[unit or "s"]
@@ -246,7 +245,7 @@ def find_layouts(file: TimerFile, gates: Sequence[int], bars: int) -> Iterator[F
         pauses = _pauses(file, layout.unit, layout.groups)
         pauses = [float(stated["pause_s"])] if "pause_s" in stated else pauses
         for channels, pause in itertools.product(maps, pauses):
-            yield replace(layout, channels=channels, pause_s=pause)
+            yield layout._replace(channels=channels, pause_s=pause)
 
 
 @lru_cache(4)

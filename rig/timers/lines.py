@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import codecs
-import os
 from collections.abc import Generator
 from pathlib import Path
+from typing import Any
 
 from rig.files import require_file
 from rig.timers.problems import ProblemList, refusal
@@ -17,10 +17,8 @@ _START = 4096
 """Bytes that show the encoding, or that this is no text."""
 
 
-def _decode_as_windows(fault: UnicodeError) -> tuple[str, int]:
+def _decode_as_windows(fault: Any) -> tuple[str, int]:
     """Read bytes that are no UTF-8 as Windows writes them, wherever they stand."""
-    if not isinstance(fault, UnicodeDecodeError):
-        raise fault
     return fault.object[fault.start : fault.end].decode("cp1252", "replace"), fault.end
 
 
@@ -65,6 +63,6 @@ def read_lines(path: str | Path) -> Generator[str]:
 def is_cut(path: str | Path) -> bool:
     """Whether a file may end in the middle of its last number."""
     with Path(path).open("rb") as stream:
-        stream.seek(-min(_START, Path(path).stat().st_size), os.SEEK_END)
+        stream.seek(max(0, Path(path).stat().st_size - _START))
         *_, before, last = map(bytes.strip, [b"", *stream.read().replace(b"\0", b"").split(b"\n")])
     return 0 < len(last) < len(before)

@@ -19,7 +19,7 @@ import numpy as np
 
 from rig.reasons import make_reason
 from rig.timers.columns import SAMPLED, TimerColumn, columns_of, pair_columns, roles
-from rig.timers.crossings import find_crossings, find_threshold
+from rig.timers.crossings import find_crossings
 from rig.timers.lines import is_cut, read_lines
 from rig.timers.moments import OVERFLOWS_PS, TICK_HZ, moment
 from rig.timers.table import Row, RowBlock, Table
@@ -32,6 +32,8 @@ MAX_EVENTS = 500_000
 _SAMPLE = 200
 """Rows that show what columns are."""
 _MARKS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", " ": "blanks", "": "words"}
+_SPARSE = 0.5
+"""Share of cells with a text below which the others belong to the one above."""
 _TURN = 600 * TICK_HZ
 """Picoseconds from a time to the next within which a counter is taken to have begun anew."""
 _REJECTED = len(STATES)
@@ -63,7 +65,6 @@ def read_file(file: TimerFile) -> TimerFile:
     file.problems.raise_if_any()
     file.changes = np.concatenate(changes)
     file.changes = file.changes[np.argsort(file.changes["line"], kind="stable")]
-    _, file.changes["rank"] = np.unique(file.changes["tick"], return_inverse=True)
     file.rows += len(table.strays)
     file.unread += [row.line for row in table.strays]
     if not len(file.changes):
@@ -95,44 +96,42 @@ class SignalReader:
         columns = columns_of(file, block, sample, self.width)
         self.signals = [*pair_columns(columns)]
         self.clocks = list(dict.fromkeys(signal.clock for signal in self.signals))
-        base = (0.0, 1.0) if self.clocks[0].role == "time" else block.find_time_base()
-        if base is None:
-            file.problems.refuse(sample[0].line, "no_rate", lacks="a column of times or a rate")
-        self.base, self.latest = base, dict[int, int]()
-        used = {column.role for column in columns}
-        filled = {x.at: sum(row.cell(x.at) != "" for row in sample) for x in columns}
-        values = [filled[at] for _, value, *_ in self.signals if (at := value.at) in filled]
-        is_filled = 2 * sum(values) > len(values) * len(sample)
+        self.base, self.latest = block.find_time_base(), dict[int, int]()
+        self.above = dict[str, str]()
+        if self.clocks[0].role != "time" and not self.base[1]:
+            durations = ", ".join(repr(x.name) for x in columns if x.role == "duration")
+            values = {"numbers": durations, "lacks": "a column of times (s, ms, µs, ns) or a rate"}
+            line = (block.headings or sample)[0].line
+            file.problems.refuse(line, "durations" if durations else "no_rate", **values)
+        used = {column.role: column for column in columns[::-1]}
+        is_filled = 2 * sum(value.filled for _, value, _ in self.signals) > len(self.signals)
         has_volts = "volts" in used
-        named = [x for x in columns[::-1] if x.role in {"run", "gate"} and not has_volts]
-        self.places = {x.role: x.at for x in named}
-        self.above = {x: "" for x, at in self.places.items() if 2 * filled[at] <= len(sample)}
+        self.places = {} if has_volts else {x: used[x] for x in ("run", "gate") if x in used}
         self.is_sampled = has_volts or ("level" in used and is_filled)
-        self.is_whole = is_filled and (self.is_sampled or len(values) > len(self.clocks))
+        self.is_whole = is_filled and (self.is_sampled or len(self.signals) > len(self.clocks))
         is_level = self.is_sampled and not (has_volts or self.places)
         self.levels = [x.value.at for x in self.signals if is_level]
-        needed = {x.at for signal in self.signals for x in signal[:2]} | {*self.places.values()}
-        self.unused = ", ".join(x.name for x in columns if x.role != "index" and x.at not in needed)
+        needed = [*self.places.values(), *itertools.chain(*(x[:2] for x in self.signals))]
+        is_used = {x.at for x in needed}.__contains__
+        self.unused = ", ".join(x.name for x in columns if x.role != "index" and not is_used(x.at))
         file.notes += [make_reason("columns_unused", columns=self.unused)] if self.unused else []
         file.lines += [f"  {column}" for column in columns]
         called = {re.sub("[0-9]+", "", clock.name) for clock in self.clocks if not clock.run}
         is_wide = len(self.clocks) > len(called) == 1 and not self.is_sampled
-        is_guess = bool(self.above) or file.ways > 1
+        is_guess = file.ways > 1 or any(x.filled <= _SPARSE for x in self.places.values())
         file.facts |= {*self.places, *["wide"] * is_wide, *["guess"] * is_guess}
         file.facts |= {"sampled"} if self.is_sampled else set()
 
     def read(self, block: RowBlock, rows: Iterator[Row]) -> Changes:
         """Return the changes that rows say; a row may say that nothing changes, or be unread."""
         file, self.block, self.count = self.file, block, 0
-        self.starts = dict[int, int]()
-        self.states = dict[tuple[int, int, int], int]()
+        self.starts, self.states = dict[int, int](), dict[tuple[int, ...], int]()
         self.changes, self.samples = list[Any](), [array("d") for _ in self.signals]
-        self.words: list[str] | None = None
+        words: list[str] | None = None
         for row in rows:
             ticks = {clock.at: self._read_time(row, clock) for clock in self.clocks}
-            words = [row.cell(at) for at in self.levels] + row.texts[self.width :]
-            if not self.levels or words != self.words or None in ticks.values():
-                self.words = words
+            before, words = words, [row.cell(at) for at in self.levels] + row.texts[self.width :]
+            if not self.levels or words != before or None in ticks.values():
                 said = [self._read_value(n, row, ticks) for n in range(len(self.signals))]
                 is_read = any(said) and not any(row.texts[self.width :])
                 file.unread += [] if is_read else [row.line]
@@ -187,51 +186,43 @@ class SignalReader:
         elif state == _REJECTED:
             self._reject(row, value, word)
         elif state or not self.is_sampled:
-            names = self._names_of(n, row)
-            before = self.states.get((n, *names))
-            self.states[n, *names] = state
+            place = self._place_of(n, row)
+            before = self.states.get((n, *place))
+            self.states[n, *place] = state
             if not self.is_whole or before != state:
                 # A first row may be the state at the beginning of a run, and no change.
                 is_first = self.is_whole and before is None
-                self._keep(n, names, is_first, row.line, tick, state)
+                self.changes.append((row.line, tick, state, *place, is_first))
         return True
 
-    def _names_of(self, n: int, row: Row) -> tuple[int, int]:
-        """Return what the run and the input are called: in the row, its heading or a mark above."""
-        (clock, value, label), block = self.signals[n], self.block
+    def _place_of(self, n: int, row: Row) -> tuple[int, ...]:
+        """Return run and input, in the row, its heading or a mark above, column and block."""
+        (clock, value, label), block, file = self.signals[n], self.block, self.file
         names = {"run": clock.run or value.run or block.run, "gate": label or block.gate}
-        for role, at in self.places.items():
-            text = row.cell(at)
-            if role in self.above:  # of merged cells only the first has a text
-                text = self.above[role] = text or self.above[role]
+        for role, column in self.places.items():
+            text = row.cell(column.at)
+            if column.filled <= _SPARSE:  # of merged cells only the first has a text
+                text = self.above[role] = text or self.above.get(role, "")
             names[role] = text or names[role]
-        return self.file.place_of(names["run"]), self.file.place_of(names["gate"])
-
-    def _keep(self, n: int, names: tuple[int, int], is_first: bool, *change: int) -> None:
-        clock, number = self.signals[n].clock.at, self.block.number
-        self.changes.append((*change, *names, clock, number, is_first, 0))
+        return *map(file.place_of, names.values()), clock.at, block.number
 
     def _find_crossings(self, n: int, row: Row) -> None:
         """Keep where volts cross the middle; note how many do, or that nothing passes."""
         clock, _, label = self.signals[n]
-        notes = self.file.notes
         samples = np.array(self.samples[n]).reshape(-1, 3)
-        volts = samples[:, 2]
-        if (threshold := find_threshold(volts)) is None:
-            limits = {"low": min(volts, default=0), "high": max(volts, default=0)}
-            notes.append(make_reason("no_passage", input=label, **limits))
-            return
-        crossings = find_crossings(samples, threshold).tolist()
-        counts = {"crossings": len(crossings), "level": threshold[0]}
-        notes.append(make_reason("crossings", input=label, **counts))
-        start, names = self.starts[clock.at], self._names_of(n, row)
-        for line, offset, is_high in crossings:
-            state = STATES.index("high" if is_high else "low")
-            self._keep(n, names, False, int(line), start + round(offset), state)
+        level, crossings = find_crossings(samples)
+        low, high = (limit(samples[:, 2], default=0.0) for limit in (min, max))
+        code, values = "crossings", {"crossings": len(crossings), "level": level}
+        if level is None:
+            code, values = "no_passage", {"low": low, "high": high}
+        self.file.notes.append(make_reason(code, input=label, **values))
+        for line, offset, is_high in crossings.tolist():
+            tick = self.starts[clock.at] + round(offset)
+            self.changes.append((int(line), tick, 3 + int(is_high), *self._place_of(n, row), False))
 
     def _reject(self, row: Row, column: TimerColumn, text: str) -> None:
         """Note a cell whose value is not accepted."""
-        self.words, accepted = None, roles()[column.role][1]
+        accepted = roles()[column.role][1]
         self.file.problems.reject(*row.place(column.at), column.role, text, accepted)
 
 

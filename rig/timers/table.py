@@ -20,6 +20,8 @@ from rig.timers.vocabulary import LONGEST, form, is_measured, is_number, kinds_o
 
 TimeBase = tuple[float, float]
 """When the first sample was taken, and the time between two, s."""
+_Shape = tuple[tuple[bool, bool], ...]
+"""Of each cell whether it is filled, and a number."""
 _Name = tuple[str, int]
 """Words before a value, and how many values with the same are before it in its line."""
 _UNFILLED = {"setting", "index", "derived"}
@@ -96,8 +98,8 @@ class RowBlock:
                 ranked.append((known, len({*row.texts}), row))
         return max(reversed(ranked), key=lambda rank: rank[:2], default=(0, 0, None))[-1]
 
-    def find_time_base(self) -> TimeBase | None:
-        """Return the first sample's time and the step, s, that settings state; `None` without."""
+    def find_time_base(self) -> TimeBase:
+        """Return the first sample's time and the step, s, that settings state; 0 without."""
         stated, rows = dict[str, float](), [*self.remarks, *self.headings]
         for above, below in itertools.pairwise([*rows, *rows[-1:]]):
             for n, text in enumerate(above.texts):
@@ -109,7 +111,7 @@ class RowBlock:
                     if role and power is not None:
                         stated.setdefault(role, float(number.replace(",", ".")) / 10.0**power)
         step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
-        return (stated.get("start", 0.0), step) if step else None
+        return stated.get("start", 0.0), step
 
     def find_inputs(self, count: int) -> list[str]:
         """Return names of inputs without a heading: those of a row that lists as many."""
@@ -132,6 +134,15 @@ class Row(NamedTuple):
         """Return what a column, from 0, has; nothing where the row has no such."""
         return self.texts[at] if 0 <= at < len(self.texts) else ""
 
+    def cell_over(self, at: int) -> str:
+        """Return what stands over a column: of merged cells only the first has a text.
+
+        The last of them is as wide as the widest other; what is beyond belongs to none.
+        """
+        filled = [n for n, text in enumerate(self.texts) if text]
+        width = max((b - a for a, b in itertools.pairwise(filled)), default=0)
+        return next(filter(None, self.texts[max(0, at + 1 - width) : at + 1][::-1]), "")
+
     def count_known(self, columns: Collection[int] | None = None) -> int:
         """Count the cells, of some columns or of all, that say what a column is."""
         texts = [text for n, text in enumerate(self.texts) if columns is None or n in columns]
@@ -147,6 +158,14 @@ class Row(NamedTuple):
         """Whether it says that another run, or gate, begins: ``--- Run 2 ---``."""
         text = vocabulary.normal(" ".join(self.texts)).strip("-=*#:<>[] ")
         return form("mark").fullmatch(text) is not None
+
+    @property
+    def is_heading(self) -> bool:
+        """Whether it stands above its block again, or has no numbers and is known by half."""
+        return not any(map(is_number, self.texts)) and (
+            self.texts in [row.texts for row in self.block.headings]
+            or 0 < len(self.texts) <= 2 * self.count_known()
+        )
 
     def place(self, at: int) -> tuple[int, int]:
         """Return the line, and the column, from 1, at which a cell begins; 1 without the cell."""
@@ -185,7 +204,7 @@ class Table:
         plain = [line for _, line in sample if line.strip() and not vocabulary.is_remark(line)]
         self._names, named = _find_names(plain)
         self.separator = find_separator(plain, named)
-        self._usual: tuple[tuple[bool, bool], ...] = ()
+        self._usual: _Shape = ()
         shapes = Counter(x for x in (_shape(self.split(y)) for y in plain) if any(map(all, x)))
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
@@ -197,7 +216,7 @@ class Table:
             # Names that come again are of another row, which may not be lost.
             again = [x for x in values.keys() - self._names if (x[0], 0) in self._names]
             return [values.get(x, "") for x in (*self._names, *again)] if values else [line]
-        cells = split_cells(line, self.separator, len(self._usual))
+        cells = split_cells(line, self.separator, self._usual)
         missing, has_comma = vocabulary.words()["missing"], form("decimal comma").fullmatch
         cells = ["" if text[:5].casefold() in missing else text for text in cells]
         return [text.replace(",", ".") if has_comma(text[:LONGEST]) else text for text in cells]
@@ -216,9 +235,10 @@ class Table:
             mark = form("remark").match(line[:LONGEST])
             text = line[mark.end() :].rstrip('" ') if mark else line
             row = Row(number, self.split(text), line, block)
-            if row.is_mark if mark or not block.width else self._begins_block(row):
-                block = self._next_block(block, line if row.is_mark else "")
-                block.headings += [] if row.is_mark else [row]
+            is_mark = not text[:1].isdigit() and row.is_mark
+            if is_mark or (block.width and not mark and row.is_heading):
+                block = self._next_block(block, line if is_mark else "")
+                block.headings += [] if is_mark else [row]
             elif mark:
                 self.remarks += [row] if number <= _SAMPLE else []
             elif not self.separator and len(row.texts) > len(self._names):
@@ -239,16 +259,9 @@ class Table:
         above = (last.headings if last.width else [*last.above, *last.headings])[:_SAMPLE]
         return RowBlock(self.remarks, above, number, run or last.run, gate or last.gate)
 
-    def _begins_block(self, row: Row) -> bool:
-        """Whether a row below others is a mark, or a heading, of further ones."""
-        if any(map(is_number, row.texts)):  # most are rows
-            return not row.raw[:1].isdigit() and row.is_mark
-        is_again = row.texts in [above.texts for above in row.block.headings]
-        return is_again or row.is_mark or 0 < len(row.texts) <= 2 * row.count_known()
-
     def _is_row(self, row: Row) -> bool:
         """Whether it has values only, and at least a number or a date, or looks as if it had."""
-        if _shape(row.texts) == self._usual:  # as most
+        if _begins_as(row.texts, self._usual):  # as most, perhaps with words behind
             return True
         # Above rows of several cells may stand a date, or a count.
         is_data = (len(row.texts) > 1 or len(self._usual) < 2) and any(map(is_measured, row.texts))
@@ -265,12 +278,12 @@ def _is_value(text: str) -> bool:
     return is_measured(text.removeprefix(vocabulary.find_label(text, "gate")).lstrip(":= "))
 
 
-def split_cells(line: str, separator: str, usual: int = 0) -> list[str]:
+def split_cells(line: str, separator: str, usual: _Shape = ()) -> list[str]:
     """Split a line into cells, without the blanks and the quotes around them."""
     if separator == " ":
         # A heading has names of several words: two blanks or more part them.
         cells = [word.strip('":') for word in line.split()]
-        is_row = len(cells) == usual or all(map(kinds_of, cells))
+        is_row = len(cells) == len(usual) or _begins_as(cells, usual) or all(map(kinds_of, cells))
         return cells if is_row else re.split(r" {2,}|\t", line.strip())
     if '"' in line:
         (cells,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
@@ -281,6 +294,7 @@ def split_cells(line: str, separator: str, usual: int = 0) -> list[str]:
 def _unwrap(line: str) -> list[str]:
     """Return a line without the brackets around it; lists in a line are lines of their own."""
     line = form("exponent of Fortran").sub("E", line) if "D" in line else line
+    line = form("remark behind").sub("", line) if "#" in line or "//" in line else line
     if line[:1].isdigit() or not form("list").match(line):
         return [line]
     pieces = form("between lists").split(line)
@@ -329,6 +343,11 @@ def find_separator(lines: Sequence[str], named: int) -> str:
     return max(counts, key=counts.__getitem__)
 
 
-def _shape(texts: Sequence[str]) -> tuple[tuple[bool, bool], ...]:
+def _begins_as(texts: Sequence[str], usual: _Shape) -> bool:
+    """Whether the first cells are as those of most rows."""
+    return usual != () and _shape(texts[: len(usual)]) == usual
+
+
+def _shape(texts: Sequence[str]) -> _Shape:
     """Return which cells are filled, and numbers; of most rows of data it is the same."""
     return tuple((text != "", is_measured(text)) for text in texts)

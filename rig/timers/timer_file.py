@@ -18,13 +18,14 @@ from rig.timers.problems import ProblemList
 from rig.timers.vocabulary import number_of
 
 STATES = ("", "clear", "blocked", "low", "high")
-"""What begins with a change, of a beam or of a signal; nothing where the file does not say."""
-_FIELDS = "line:i4 tick:O state:i1 run:i4 label:i4 clock:i4 block:i4 first:? rank:i4"
+"""What begins with a change, of a beam or of a signal, in turns clear and blocked, or low and high;
+nothing where the file does not say."""
+_FIELDS = "line:i4 tick:O state:i1 run:i4 label:i4 clock:i4 block:i4 first:?"
 CHANGE = np.dtype([tuple(name.split(":")) for name in _FIELDS.split()])
 """A change at an input: its line; its time, ps (of a date it needs more than 64 bits); which of
 `STATES` begins; what the file calls the run and the input (places in `TimerFile.names`); which
-column of times it is of, where several are alike; the block of rows; whether it is a first row,
-which may say the state at the beginning; and how many times are before it."""
+column of times it is of, where several are alike; the block of rows; and whether it is a first row,
+which may say the state at the beginning."""
 Changes: TypeAlias = NDArray[Any]
 """Rows of `CHANGE`."""
 

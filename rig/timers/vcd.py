@@ -26,16 +26,17 @@ def vcd_rows(lines: Iterator[tuple[int, str]], problems: ProblemList) -> Iterato
     yield 0, ",".join(["time (s)", *names.values()])
     at, time, levels, changes = 0, "0", dict.fromkeys(names, "x"), dict[str, str]()
     for number, word in _words(lines):
-        if word[0] == "#" and word[1:].isdecimal():
+        value, wire = word[0], word[1:]
+        if value == "#" and wire.isdecimal():
             if at or changes:
                 levels |= changes
                 yield at, ",".join([time + unit, *levels.values()])
-            at, time, changes = number, word[1:], {}
-        elif (wire := word[1:]) in levels and changes.setdefault(wire, word[0]) != word[0]:
-            accepted = "a change: this wire has another value at this time already"
-            problems.reject(number, 1, names[wire], word, accepted)
-        elif word[0] in "01" and wire not in levels:
-            problems.reject(number, 1, "wire", word, "a change of a wire that $var lists")
+            at, time, changes = number, wire, {}
+        elif (wire in names and changes.setdefault(wire, value) != value) or (
+            wire not in names and (value in "01" or (value == "#" and wire))
+        ):
+            accepted = "a time, or a wire of $var with one level at each time"
+            problems.reject(number, 1, names.get(wire, "wire"), word, accepted)
 
 
 def _words(lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:

@@ -160,7 +160,7 @@ def strangers() -> dict[str, Shape]:
 
 NOT_READ = {
     "Runs by a word alone", "Written by hand",
-    "States the other way round", "A channel for all gates", "Samples of a channel for all gates",
+    "A channel for all gates", "Samples of a channel for all gates",
     "Durations", "A summary below", "A word below", "A name for two columns",
     "Minutes and seconds", "Seconds that are called minutes",
     "More names than columns", "Samples with an index",
