@@ -27,7 +27,6 @@ VALUES: tuple[Any, ...] = (
     '{"a":', '["\\ud800"]', "\x1b[2J\u202e", 5000 * "[", b"", b"\xff\x00", b"text \xff",
 )  # fmt: skip
 """Put into any column; of the last one SQLite says that it is text."""
-_ODD = ["\0", "\x1b", "\u202e", "é", "\ud800", "9" * 400, "-1", "1e999", "nan", "[", "{", ": ", "- ", "\t", "&a *a", "±", "!!python/object:os.system", "'"]  # fmt: skip  # noqa: E501
 CSV = "run,channel,time_s,state\n1,0,0.1,1\n1,0,0.2,0\n1,1,0.15,1\n1,1,0.25,0\n2,0,0.1,1\n"
 
 
@@ -163,23 +162,6 @@ def read_through(path: Path) -> None:
     with Session.open(path, readonly=True) as session:
         session.check()
         session.latest_state(1)
-
-
-def altered_text(text: str, seed: int) -> str:
-    """Alter a text file in a few places."""
-    rng = random.Random(seed)
-    for _ in range(rng.randrange(1, 4)):
-        at = rng.randrange(len(text))
-        to = at + rng.choice([0, 1, 1, rng.randrange(30)])
-        again = text[rng.randrange(len(text)) :][: rng.randrange(40)]
-        text = text[:at] + rng.choice([*_ODD, again, ""]) + text[to:] or "x"
-    return text
-
-
-def read_text_with(read: Callable[[Path], object], text: str, path: Path) -> None:
-    """Write a text and read it."""
-    path.write_bytes(text.encode("utf-8", "surrogateescape" if "\ud800" not in text else "replace"))
-    read(path)
 
 
 def failures(each: Callable[[int], object], seeds: range) -> list[str]:

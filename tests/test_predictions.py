@@ -66,12 +66,6 @@ def test_all_who_predict_say_the_same(name):
             assert gaps[-1] + longer == pytest.approx(line["separation_m"], rel=1e-9)
 
 
-def test_air_holds_back():
-    with_air, without = (predictions(reader.parse(text))[0] for text in (short() + AIR, short()))
-    assert with_air.speed_m_s < without.speed_m_s
-    assert with_air.fall_time_s > without.fall_time_s
-
-
 @pytest.mark.parametrize("air", ["", AIR])
 @pytest.mark.parametrize("length", ["600 mm", "15 mm"])
 def test_a_rod_that_touches_before_the_release_is_a_note_at_its_incline(length, air):

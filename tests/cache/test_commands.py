@@ -38,6 +38,8 @@ def record_scene(folder, scene):
     ],
 )
 def session(request, tmp_path_factory):
+    if request.param == "fence":
+        return request.getfixturevalue("recorded")
     return record_scene(tmp_path_factory.mktemp(request.param), request.param)
 
 

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.usefixtures("analysed_once")
 
 @pytest.fixture(scope="module")
 def ball(analysed_once, tmp_path_factory):
-    text = (PROTOCOLS / "falling-ball.yaml").read_text("utf-8")
+    text = (PROTOCOLS / "falling-ball.yaml").read_text("utf-8").replace("repeats: 10", "repeats: 4")
     return record(tmp_path_factory.mktemp("ball"), text, "sim://?stated=1&seed=3")
 
 

@@ -4,14 +4,9 @@ import shutil
 
 import pytest
 
-from rig.link import messages as wire
-from rig.link.frames import Decoder
-from rig.recorder.recorder import Recorder
 from rig.records import ClockSample
 from rig.replay import replay
 from rig.session.store import Session
-from sim.board import VirtualBoard
-from tests.cli.lab import drops_of
 from tests.session.altering import unguarded
 from tests.tables import cases
 
@@ -26,21 +21,6 @@ def tamper(session, sql, *values):
     """Change a session behind its back, guards taken away first."""
     with unguarded(session) as connection:
         assert connection.execute(sql, values).rowcount == 1
-
-
-def test_a_release_sense_is_kept_and_comes_out_the_same(call, tmp_path, fence, monkeypatch):
-    connect = Recorder.__init__
-
-    def wired(recorder, *what):
-        connect(recorder, *what)
-        recorder._port.board.sense(0.0125)
-
-    monkeypatch.setattr(Recorder, "__init__", wired)
-    call("run", fence, "--port", "sim://", "--session", tmp_path / "s")
-    with Session.open(tmp_path / "s", readonly=True) as session:
-        senses = [drop.certificate.release_sense for drop in session.drops()]
-    assert senses == [pytest.approx(200_000, rel=0.005)] * 2
-    assert call("replay", tmp_path / "s").out.splitlines()[0] == "drops: 2 identical"
 
 
 def test_a_session_is_identical_to_its_own_bytes(call, finished):
@@ -79,23 +59,3 @@ def test_what_was_tampered_with_is_called_different(call, fenced, sql, found):
         if different
         else "identical"
     )
-
-
-def test_a_drop_whose_acknowledgement_was_lost_is_replayed_once(call, tmp_path, fence, monkeypatch):
-    """The host stored it and said so into a dead cable: the next connection says it again."""
-    receive, lost = VirtualBoard.receive, []
-
-    def losing(board, start_ns, data):
-        frames = Decoder().feed(data)
-        if len(lost) < 8 and frames and frames[0].type == wire.CODES[wire.Acknowledge]:
-            lost.append(data)
-        else:
-            receive(board, start_ns, data)
-
-    monkeypatch.setattr(VirtualBoard, "receive", losing)
-    command = ("run", fence, "--port", "sim://", "--session", tmp_path / "s")
-    call(*command, code=4)
-    assert len(lost) == 8
-    call(*command)
-    assert drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
-    assert call("replay", tmp_path / "s").out.splitlines()[0] == "drops: 2 identical"

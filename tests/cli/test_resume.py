@@ -235,67 +235,31 @@ def test_a_process_in_the_background_goes_on_ignoring_ctrl_c():
 # ------------------------------------------------- what the board is left with
 
 
-@pytest.fixture(params=["board goes on", "board restarts"])
-def one_board(request, monkeypatch):
-    """Have one board behind the port, which opening restarts or not, as boards differ.
-
-    Give the function that makes time pass for it.
-    """
-    made = []
+def test_a_drop_of_another_session_is_neither_taken_nor_discarded(
+    call, run, tmp_path, fence, monkeypatch
+):
+    """Of a board that opening its port restarts, and that keeps its drop."""
+    boards = []
 
     def reopen(url):
-        if not made:
-            made.append(open_port(url))
-            made[0].reset_on_open = request.param == "board restarts"
+        if not boards:
+            boards.append(open_port(url))
+            boards[0].reset_on_open = True
         else:
-            made[0].open()
-        return made[0]
+            boards[0].open()
+        return boards[0]
 
     monkeypatch.setattr("rig.recorder.recorder.open_port", reopen)
-    return lambda seconds: made[0].clock.sleep(seconds)  # noqa: PLW0108 - none is made yet
 
-
-def cut_off_in_the_fall(run, monkeypatch, state=RunState.FIRED):
-    """Lose the connection just before the drop is read, or just before it is acknowledged."""
-    fail = {RunState.FIRED: "collect", RunState.RECORDED: "acknowledge"}[state]
-
-    lost = DeviceError("connection lost: somebody stumbled")
-    with monkeypatch.context() as patch:
-        patch.setattr(Device, fail, Mock(side_effect=lost))
-        run(code=4)
-
-
-@pytest.mark.parametrize("state", [RunState.FIRED, RunState.RECORDED])
-def test_a_drop_that_the_board_still_holds_is_fetched(run, tmp_path, monkeypatch, one_board, state):
-    cut_off_in_the_fall(run, monkeypatch, state)
-    assert lab.log_of(tmp_path / "s")[1][-1] == (1, state)
-    one_board(2.0)  # the recording ends
-    assert "fetching run 1, attempt 1, from the device" in run().err
-    assert lab.drops_of(tmp_path / "s") == [(1, 1), (2, 1)]
-    assert len(lab.truth_of(tmp_path / "s")) == 2
-    lab.assert_whole(tmp_path / "s", 2)
-
-
-@pytest.mark.parametrize("one_board", ["board restarts"], indirect=True)
-def test_a_drop_that_a_restart_cut_short_is_made_again(run, tmp_path, monkeypatch, one_board):
-    cut_off_in_the_fall(run, monkeypatch)
-    assert "fetching" not in run().err
-    assert lab.log_of(tmp_path / "s")[1][2:4] == [(1, RunState.INTERRUPTED), (2, RunState.ARMED)]
-    assert lab.drops_of(tmp_path / "s") == [(1, 2), (2, 1)]
-    lab.assert_whole(tmp_path / "s", 2)
-
-
-@pytest.mark.parametrize("one_board", ["board restarts"], indirect=True)
-def test_a_drop_of_another_session_is_neither_taken_nor_discarded(
-    call, run, tmp_path, fence, monkeypatch, one_board
-):
     def other(name, **ends):
         words = ("run", fence, "--port", "sim://", "--session", tmp_path / name)
         return call(*words, "--seed", 1, **ends)
 
     other("older")
-    cut_off_in_the_fall(run, monkeypatch)
-    one_board(2.0)
+    with monkeypatch.context() as patch:  # just before the drop is read
+        patch.setattr(Device, "collect", Mock(side_effect=DeviceError("connection lost")))
+        run(code=4)
+    boards[0].clock.sleep(2.0)  # the recording ends
     for name in ("newer", "older"):
         before = lab.drops_of(tmp_path / name) if name == "older" else []
         done = other(name, code=4)

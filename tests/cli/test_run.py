@@ -8,10 +8,8 @@ from html import unescape
 import pytest
 
 from rig.analysis import drop as reading
-from rig.reasons import Reason
-from rig.session.schema import RunState
 from rig.session.store import Session
-from tests.cli.lab import assert_whole, drops_of, log_of, rig, short, truth_of
+from tests.cli.lab import assert_whole, drops_of, log_of, rig, truth_of
 
 MEASURED = ("separation_m", "separation_raw_m", "speed_m_s", "release_skew_s")
 
@@ -91,27 +89,6 @@ def test_three_voids_of_a_kind_end_it_with_code_3_and_still_json(run, call, tmp_
     call("report", tmp_path / "s", "-o", tmp_path / "r.html")
     what = again.out.splitlines()[again.out.splitlines().index("what to do:") + 1].strip()
     assert f"<td>{what}" in unescape((tmp_path / "r.html").read_text("utf-8"))
-
-
-def test_what_is_put_right_is_gone_on_with_by_the_same_command(call, tmp_path):
-    (tmp_path / "p.yaml").write_text(short("40 deg", 2), "utf-8")
-    args = ("run", tmp_path / "p.yaml", "--port", "sim://?skew_sd=6ms&seed=31", "--session")
-    assert "void for the same reason: release skew" in call(*args, tmp_path / "s", code=3).err
-    assert drops_of(tmp_path / "s") == [(1, 1), (1, 2), (1, 3)]
-    call(*args, tmp_path / "s")
-    assert_whole(tmp_path / "s", 2)
-
-
-def test_a_run_that_is_void_for_one_reason_after_another_stays_void(run, tmp_path, fence):
-    path, reasons = tmp_path / "s", ("edges_lost", "edges_missed", "crc_mismatch")
-    Session.create(path, fence.read_text("utf-8"), fence.name, simulated=True,
-                   origin="sim://?seed=1").close()  # fmt: skip
-    with Session.open(path) as session:
-        for attempt, reason in enumerate(reasons, start=1):
-            session.add_state(1, attempt, RunState.VOID, 0, (Reason(reason),))
-        session.commit()
-    run("s", protocol=fence)
-    assert [(run, len(entries)) for run, entries in log_of(path).items()] == [(1, 3), (2, 4)]
 
 
 def test_a_finished_session_is_not_made_again(call, finished, tmp_path):

@@ -110,20 +110,6 @@ def line(worker):
     return worker.controller.recorder.device.statistics()
 
 
-def test_a_stop_does_not_wait_for_answers_that_are_lost(unheard):
-    """The board hears and is not heard: what is asked is repeated, and ended by what STOP asks."""
-    processes, worker, _ = unheard
-    processes.hand("mute 1")
-    until(lambda: line(worker)["repeats"])
-    asked = line(worker)["requests"]
-    stopped = worker.stop("no answer")
-    until(lambda: line(worker)["requests"] > asked)
-    processes.await_phase(Phase.IDLE)
-    processes.hand("mute 0")
-    stopped.result(PATIENCE_S)
-    assert states(processes) == [(1, 1, "armed"), (1, 1, "interrupted")]
-
-
 def test_a_stop_after_a_release_that_was_not_answered_keeps_what_fell(unheard):
     processes, worker, token = unheard
     processes.hand("mute fall")

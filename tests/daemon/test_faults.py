@@ -3,52 +3,16 @@
 import shutil
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
-from bench.faults import NOISE, OFF_S, disturbed
 from bench.invariants import broken
 from bench.process_fixture import ProcessFixture
-from rig.errors import SessionError
 from rig.link.messages import Phase
 from rig.replay import replay
 from rig.session.schema import RunState
 from rig.session.store import Session
-
-
-def test_nothing_is_lost_when_a_daemon_is_killed_or_bytes_are():
-    """Of the others: tests/daemon/test_state_space.py, test_control.py, and a full disk below."""
-    with ThreadPoolExecutor(2) as pool:
-        noise = pool.submit(disturbed, "daemon", 0, 5, runs=1, dials=NOISE)
-        made = pool.submit(disturbed, "daemon", 1, 7, runs=1)
-        for tally in (noise.result(), made.result()):
-            assert tally.broken == []
-            assert tally.longest_on_s <= OFF_S
-        assert sum(made.result().fell_upon.values()) == 1
-        assert noise.result().bad_frames > 0
-
-
-def test_a_full_disk_leaves_the_drop_in_the_device_until_there_is_room(processes, driver):
-    driver.fire(driver.arm(1, 1))
-    processes.fill_disk()
-    with pytest.raises(SessionError):
-        driver.collect(1, 1)
-    state = driver.call("subscribe")["state"]
-    assert state["phase"] == "trouble"
-    assert state["error"]["kind"] == "SessionError"
-    processes.await_phase(Phase.HOLDING)
-    assert list(processes.happened())[-1]["phase"] == Phase.HOLDING
-    with Session.open(processes.session, readonly=True) as session:
-        assert session.drop(1, 1) is None, "it is readable, and does not claim to have the drop"
-    processes.free_disk()
-    processes.await_phase(Phase.IDLE)  # by itself, as soon as there is room
-    assert driver.collect(1, 1).faults == ()
-    driver.close()
-    assert processes.run() == 0, processes.told
-    assert broken(processes.session, processes.happened(), processes.runs) == []
-
 
 HOUR_S = 3600
 SET_S = [5 * HOUR_S, -7 * HOUR_S, 0, -30 * 24 * HOUR_S]

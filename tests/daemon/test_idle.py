@@ -1,6 +1,5 @@
 """A daemon that nobody asked for by name ends when nobody needs it, and never with a drop."""
 
-import sys
 import time
 
 import pytest
@@ -10,7 +9,6 @@ from rig.errors import RigError
 from rig.link.messages import Phase
 from rig.session.store import Session
 from tests.daemon.at_work import ended, states
-from tests.programs import run_program
 from tests.waiting import PATIENCE_S, until
 
 IDLE_S = 0.4
@@ -55,16 +53,6 @@ def test_it_stays_while_a_client_is_there_and_disarms_before_it_ends(processes, 
     assert not processes.socket.exists()
     processes.await_phase(Phase.IDLE)
     assert states(processes) == [(1, 1, "armed"), (1, 1, "interrupted")]
-
-
-def test_one_that_was_started_by_hand_stays(tmp_path):
-    with ProcessFixture(runs=1) as processes:
-        processes.start_daemon()
-        words = f"-m rig daemon --port sim:// --idle-timeout {IDLE_S} --socket".split()
-        place = processes.folder / "other" / "rig.sock"
-        other = run_program(sys.executable, *words, place)
-        assert ALONE in other.stderr
-        processes.client().close()
 
 
 def test_a_drop_that_only_the_board_has_is_waited_for(processes, driver):

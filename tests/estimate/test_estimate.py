@@ -15,7 +15,6 @@ from rig.estimate.quadratic_forms import merge_like
 from rig.estimate.rods import _gains
 from rig.estimate.session import estimate
 from rig.model.impact import alpha_inclined
-from rig.predictions import predict_incline
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Priors
 from rig.protocol.reader import parse
@@ -25,7 +24,6 @@ from rig.units import Quantity
 from tests.analysis.drops import FENCE, SINGLE, UNIFORM, case
 from tests.analysis.sessions import MILD, cases
 from tests.analysis.sessions import analysis as analyzed
-from tests.analysis.test_datum_board import BOARD_GRADED
 from tests.estimate.sessions import BETA, MU, analysis, forms
 
 SURFACE = (30.0, 50.0, 70.0)
@@ -192,14 +190,6 @@ def test_air_that_the_protocol_states_counts_once():
     for line, incline in zip(lines, 2 * SURFACE, strict=True):
         truth = alpha_inclined(0.5, 0.2, incline)
         assert abs(line["alpha"]["value"] - truth) < 4 * line["alpha"]["u"]
-
-
-def test_the_models_curves_end_at_the_prediction_where_rods_touch_higher_than_the_top_one():
-    protocol = parse(f"{BOARD_GRADED.text}drag: {{terminal_speed: 15 m/s}}\n")
-    (curve,) = estimate(protocol, dropped(protocol, (40.0,), 1)).json()["curves"]
-    expected = predict_incline(protocol, 40.0, "A")
-    assert curve["speed2_m2_s2_model"][-1] == pytest.approx(expected.speed_m_s**2)
-    assert curve["separation_m_model"][-1] == pytest.approx(expected.separation_m, rel=1e-3)
 
 
 def test_inclines_outside_the_model_tell_no_coefficient():

@@ -206,14 +206,6 @@ def test_arguments_broadcast_and_blocks_do_not_show(monkeypatch):
     assert ends(found) == wanted
 
 
-def test_where_there_is_no_answer_it_says_so_and_the_others_stay_right():
-    chain = even_chain(3)
-    found = falls(chain.masses, chain.heights, given_impacts([0.1, np.nan], 1.0), 0.18, 9.81)
-    for row in found:
-        assert np.isnan(row).tolist() == [False, True]
-    assert ends(found)[0] == end(chain, 0.1, 1.0, 0.18, 9.81)
-
-
 SURFACES = st.tuples(
     st.one_of(st.sampled_from([0.0, 20.0, 90.0]), st.floats(0.0, 90.0)),
     st.floats(-0.9, 1.0),

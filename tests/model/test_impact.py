@@ -14,18 +14,8 @@ from mpmath import mp
 
 from rig.bench.references import exact_coefficients
 from rig.errors import DomainError
-from rig.model.chain import Chain
 from rig.model.fall import kicks
-from rig.model.impact import (
-    ALPHA,
-    PILE,
-    alpha_inclined,
-    alpha_level,
-    gamma_finite,
-    impact_on,
-    stated_coefficients,
-    with_coefficients,
-)
+from rig.model.impact import alpha_inclined, alpha_level, gamma_finite, impact_on
 from rig.model.surface import Pile, Surface
 from rig.units import Quantity
 from tests.examples import examples
@@ -33,15 +23,6 @@ from tests.model.chains import chains, close, even_chain
 from tests.tables import cases
 
 FRICTIONS = st.one_of(st.just(0.0), st.floats(1e-6, 1.0))
-
-
-def test_level_alpha_is_the_papers():
-    assert alpha_level(0.5) == pytest.approx(0.25, rel=1e-15)
-    assert alpha_level(0.0) == pytest.approx(1 / 6, rel=1e-15)
-    assert alpha_level(-1.0, 0.4) == 0.0  # no collision
-    assert alpha_level(0.5, 1.0) == 0.0  # the centre of percussion is where the rod strikes
-    assert gamma_finite(1 / 3) == pytest.approx(4 / 3, rel=1e-15)
-    assert gamma_finite(1 / 3, 1.0) == pytest.approx(2 / 3, rel=1e-15)
 
 
 @examples(80)
@@ -74,28 +55,6 @@ def test_what_alpha_rests_on(piled, incline, basis, restitution):
     assert impact.notes == ()
 
 
-OTHER = {"restitution": 0.1, "friction": 0.3, PILE: 0.2}
-
-
-def test_given_coefficients_win_over_the_surface():
-    beads = Chain(RODS.masses, RODS.heights, alpha=Quantity(0.12, 0.02))
-    assert impact_on(PILED, beads, 10.0).gamma == 0.0
-    stiff = Chain(RODS.masses, RODS.heights, alpha=Quantity(0.12), gamma=0.7)
-    impact = impact_on(*with_coefficients(SURFACE, stiff, OTHER), 40.0)
-    assert (impact.alpha, impact.gamma, impact.basis) == (0.12, 0.7, "given")
-    free = impact_on(SURFACE, Chain(RODS.masses, RODS.heights, gamma=0.7), 40.0)
-    assert (free.alpha, free.gamma) == (alpha_inclined(0.5, 0.2, 40.0), 0.7)
-
-
-def test_central_values_can_be_replaced():
-    changed = with_coefficients(PILED, RODS, OTHER)
-    assert impact_on(*changed, 40.0).alpha == alpha_inclined(0.1, 0.3, 40.0)
-    assert impact_on(*changed, 10.0).alpha == alpha_level(0.2)
-    assert {k: q.value for k, q in stated_coefficients(*changed, 10.0).items()} == {PILE: 0.2}
-    given = with_coefficients(*changed, {ALPHA: 0.3})
-    assert stated_coefficients(*given, 10.0) == {ALPHA: Quantity(0.3)}
-
-
 @examples(80)
 @given(st.floats(-2.0, 3.0), FRICTIONS, st.one_of(st.just(0.0), st.floats(1e-6, 89.0)))
 def test_notes_say_when_and_only_when_the_domain_is_left(beta, mu, incline):
@@ -108,10 +67,6 @@ def test_notes_say_when_and_only_when_the_domain_is_left(beta, mu, incline):
     assert ("above ½" in notes) == (impact.alpha > 0.5)
     assert ("negative" in notes) == (impact.alpha < 0.0)
     assert len(impact.notes) == sticks + (impact.alpha > 0.5) + (impact.alpha < 0.0)
-
-
-def test_a_surface_of_which_no_friction_is_said_has_none():
-    assert Surface(Quantity(0.2)) == Surface(Quantity(0.2), Quantity(0.0))
 
 
 TIGHT = 1e-13
@@ -208,3 +163,7 @@ def test_unlike_axes_solve_the_equations_of_motion(beta, mu, incline, inertia, i
     assert close(impact.alpha, wanted, TIGHT)
     # γ is about the horizontal axis and knows nothing of ξ_z.
     assert impact.gamma == gamma_finite(inertia)
+
+
+def test_a_surface_of_which_no_friction_is_said_has_none():
+    assert Surface(Quantity(0.2)) == Surface(Quantity(0.2), Quantity(0.0))

@@ -7,17 +7,8 @@ from contextlib import closing
 
 import pytest
 
-from bench.mutants import (
-    FENCE,
-    Mutants,
-    altered_text,
-    failures,
-    make_session,
-    read_text_with,
-    read_through,
-)
+from bench.mutants import Mutants, failures, make_session, read_through
 from rig.errors import SessionError
-from rig.protocol import reader
 from rig.records import Certificate, Drop, Edge
 from rig.recover.examine import describe, examine
 from rig.session import foreign
@@ -75,17 +66,6 @@ def test_recover_tells_of_any_session_and_calls_none_whole_that_cannot_be_read(m
                 raise AssertionError(what) from error
 
     assert failures(each, range(150)) == []
-
-
-@pytest.mark.slow
-def test_any_protocol_is_read_or_refused(tmp_path):
-    """As `tests/protocol/test_protocol_reader.py` sees of fewer."""
-    path, text = tmp_path / "mutant.yaml", FENCE.replace("RUNS", "2")
-
-    def each(seed):
-        read_text_with(reader.read, altered_text(text, seed), path)
-
-    assert failures(each, range(2000)) == []
 
 
 @cases

@@ -131,15 +131,6 @@ def test_a_file_of_an_older_format_is_read_and_continued(filled, version):
     assert tables(path) == tables(new), "an upgraded file is like a new one, guards and all"
 
 
-def test_latest_drops_are_the_last_attempts(path):
-    second = replace(IMPORTED, attempt=2)
-    with make(path) as session:
-        session.add_drop(second)
-        session.add_drop(IMPORTED)
-        assert session.latest_drops() == [second]
-        assert list(session.drops()) == [second, IMPORTED]
-
-
 @pytest.mark.parametrize("table", TABLES)
 @cases
 def test_raw_records_are_never_altered(filled, table, statement):

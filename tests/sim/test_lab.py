@@ -8,12 +8,11 @@ from hypothesis import strategies as st
 
 from rig.errors import InputError
 from rig.link.messages import pack_label
-from rig.protocol import reader
 from sim.dials import Dials
 from sim.lab import ChainLab
 from sim.truth import Truth
 from tests.examples import examples
-from tests.sim.falls import DELAY, PROTOCOLS, UNIFORM, ByHand, crossings, free_time_down
+from tests.sim.falls import DELAY, UNIFORM, ByHand, crossings, free_time_down
 
 QUIET = Dials.quiet()
 RUN_OF = {run.incline_deg: number for number, run in ChainLab(UNIFORM, QUIET, 0).runs.items()}
@@ -55,18 +54,6 @@ def test_every_quiet_edge_is_where_the_equations_put_it(incline):
         expected += len(crossed)
     assert len(edges) == expected
     assert [e[0] for e in edges] == sorted(e[0] for e in edges)
-
-
-def test_a_single_chain_has_a_speed_and_no_separation():
-    protocol = reader.read(PROTOCOLS / "single-chain.yaml")
-    edges, truth = drop(protocol)
-    by_hand = ByHand.at(40)
-    for gate in protocol.gates.gates:
-        assert_same_edges(on(edges, gate.channel), crossings(gate.height, by_hand.time_down))
-    assert {channel for _, channel, _ in edges} == {g.channel for g in protocol.gates.gates}
-    assert truth.speed_m_s == exactly(by_hand.before[-1])
-    assert truth.impact_chain == "A"
-    assert truth.separation_m is truth.separation_raw_m is truth.release_skew_s is None
 
 
 def test_hanging_chains_leave_the_beams_free_unless_hung_too_low():

@@ -82,26 +82,6 @@ def test_single_impulses_scatter_independently_by_the_dial():
     assert_normal([t.separation_m - float(level) for t in drops], sd * math.hypot(*slopes))
 
 
-@pytest.mark.parametrize("true", [{"restitution": 0.6}, {"friction": 0.25}])
-def test_true_coefficients_may_differ_from_the_protocol_s(true):
-    (name, value), *_ = true.items()
-    by_hand = ByHand.at(40, **{{"restitution": "beta", "friction": "mu"}[name]: str(value)})
-    truth = attempts(with_dials(**true), 1)[0]
-    assert truth.separation_m == pytest.approx(float(by_hand.separation), rel=1e-12)
-    assert truth.speed_m_s == pytest.approx(float(by_hand.before[-1]), rel=1e-12)
-
-
-def test_rods_bounce_through_the_lowest_beam_of_the_impact_side_alone():
-    truth = attempts(with_dials(bounce=1.0), 1)[0]
-    bounces = [edge for edge in truth.edges if edge[3] == NOT_A_ROD]
-    assert {channel for _, channel, _, _ in bounces} == {0}
-    hits = [DELAY + float(t) for t in ByHand.at(40).times]
-    assert 2 <= len(bounces) <= 2 * RODS  # many merge with the next rods' shadows
-    assert min(t for t, *_ in bounces) > hits[0] + 4e-3
-    assert max(t for t, *_ in bounces) < hits[-1] + 40e-3
-    assert {edge[1] for edge in truth.edges if edge[0] > hits[-1] + 1e-3 and edge[1] < 8} == {0}
-
-
 def test_the_string_flickers_in_gaps_between_rods():
     quiet = attempts(with_dials(), 1)[0]
     truth = attempts(with_dials(string=1.0), 1)[0]
@@ -170,16 +150,6 @@ def test_a_chain_strikes_with_its_own_rods():
     b_top = 0.18 + 1.165 - b_map[24,]
     fallen = G * float(by_hand.times[-1]) ** 2 / 2
     assert a_strikes.separation_m == pytest.approx(b_top - fallen, abs=1e-11)
-
-
-def test_gate_errors_belong_to_the_gate_in_every_run():
-    dials = with_dials(gate_sd=0.2e-3)
-    first, other, again = truths(dials, 3, (A_STRIKES, 1), (B_STRIKES, 1), (A_STRIKES, 9))
-    gates = common(residuals(first), 0)
-    assert gates == pytest.approx(common(residuals(other), 0), abs=1e-12)
-    assert again.edges == first.edges
-    assert len({round(off, 9) for off in gates.values()}) == len(gates)
-    assert_normal([x for s in range(30) for x in common(one(dials, s), 0).values()], 0.2e-3)
 
 
 def test_a_wider_rod_blocks_earlier_and_frees_later():

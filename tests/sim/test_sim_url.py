@@ -82,12 +82,6 @@ def test_a_bad_line_still_gives_the_whole_drop_once(tmp_path, seed):
     assert len(truth_lines(file)) == 1  # a repeated FIRE does not let go twice
 
 
-def test_a_percent_sign_need_not_be_escaped():
-    plain = sim_url(seed=1) + "&missed=20%&skew_sd=4 ms&clock=-1300 ppm"
-    escaped = sim_url(seed=1, missed="20 %", skew_sd="4ms", clock="-1300ppm")
-    assert talk(plain) == talk(escaped) != talk(sim_url(seed=1))
-
-
 def test_a_busy_line_changes_only_what_goes_both_ways_at_once():
     line = BadLine(0.0, 0.0, 1.0, seed=1)
     data = bytes(range(100))

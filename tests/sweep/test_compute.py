@@ -74,19 +74,6 @@ def test_points_are_single_falls_with_the_notes_of_single_impacts():
     assert seen == NOT_SLIDING | ABOVE_HALF | NO_ANSWER | PILE
 
 
-def test_a_value_holds_a_parameter_and_the_inclines_are_layers():
-    protocol = reader.parse(SCENE)
-    layout = lay_out(protocol, ["friction=0..1:3", "drop=90mm"])
-    assert list(layout.axes) == ["incline", "friction"]
-    assert layout.shape == (3, 3)
-    assert layout.layered
-    assert layout.fixed_values["drop"] == 0.09
-    layout = lay_out(protocol, ["friction=0..1:3", "incline=40deg"])
-    assert not layout.layered
-    assert layout.shape == (3,)
-    assert layout.fixed_values["incline"] == 40.0
-
-
 @cases
 def test_only_what_the_scene_has_can_be_varied(scene, vary, said):
     refused(InputError, said, lay_out, reader.read(PROTOCOLS / scene), [vary])
