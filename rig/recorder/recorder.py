@@ -237,9 +237,7 @@ class Recorder:
         except (StoppedError, DeviceRefusedError) as ended:
             # A STOP that overtook the answer makes the device refuse the repeated request.
             if isinstance(ended, StoppedError) or self._halted():
-                self.abort()
-                if self.held() == (run, attempt):
-                    self.armed = None  # it had heard: what fell is collected
+                self.abort()  # if it had heard, what fell is collected
             raise
         self.armed = None  # from here on there is a recording, which `let_go` leaves alone
 
