@@ -70,7 +70,7 @@ class Discrepancy:
         Distance by which impacts bring the chain ahead of a free fall until the last, m.
     late_pull, late_way
         Gain of speed of the top rod by the impulses that come after its last passage of a beam, m/s
-        (at least by the last, which may come late), and the distance below that beam, m.
+        (at least by the last, which may come late), and the distance over which they come, m.
     """
 
     nominal: Trajectory
@@ -107,7 +107,8 @@ class Discrepancy:
         unseen = strikes[-1] - strikes[:-1] <= max(lowest, gap)
         pulls = (nominal.hits.ratio * nominal.hits.arrival)[:-1]
         pull = abs(record.alpha) * float(pulls[unseen].sum())
-        return cls(nominal, stretch, lead, pull, max(0.0, lowest))
+        way = max(0.0, min(lowest, float(np.ptp(strikes))))
+        return cls(nominal, stretch, lead, pull, way)
 
     def top(self, levels: Array) -> Array:
         """Return the modes of the top rod for levels of the reference point, m."""

@@ -220,7 +220,7 @@ def test_a_last_leg_that_the_whole_fall_does_not_bear_out_is_remarked():
     assert "Δz as it fell = 105.0 ± 1.2 mm, the whole fall 115.00 ± 0.98 mm" in nearer.text
 
 
-@pytest.mark.parametrize("lowest_m", [0.022, 0.034, 0.13, 0.35])
+@pytest.mark.parametrize("lowest_m", [0.022, 0.034, 0.13, 0.35, 1.078])
 def test_all_pulls_that_no_beam_sees_may_come_late_and_the_last_in_any_case(lowest_m):
     """By Eq. 9, from the speeds before and after each strike below the top rod's last passage."""
     gates = [gate for gate in UNIFORM.gates.gates if gate.height >= lowest_m]
