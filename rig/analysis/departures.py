@@ -106,9 +106,8 @@ class Discrepancy:
         lowest = min((protocol.gates.gates[beam.gate].height for beam in seeing), default=gap)
         unseen = strikes[-1] - strikes[:-1] <= max(lowest, gap)
         pulls = (nominal.hits.ratio * nominal.hits.arrival)[:-1]
-        pull = abs(record.alpha) * float(pulls[unseen].sum())
-        way = max(0.0, min(lowest, float(np.ptp(strikes))))
-        return cls(nominal, stretch, lead, pull, way)
+        pull, whole = abs(record.alpha) * float(pulls @ unseen), float(np.ptp(strikes))
+        return cls(nominal, stretch, lead, pull, min(max(lowest, 0.0), whole))
 
     def top(self, levels: Array) -> Array:
         """Return the modes of the top rod for levels of the reference point, m."""

@@ -214,9 +214,9 @@ def _stretch_sd(side: Side) -> list[float]:
 
 def _late_sd(side: Side) -> float:
     """Prior of the late pull, in proportion to the scatter of the last pull that edges measure."""
-    stated, last = priors(side.protocol), np.ones(1)
-    scatter, usual = (each.impulses(side.alpha, last) for each in (side.model.components, stated))
-    return side.protocol.priors.late_pull * float(scatter[0] / usual[0] if usual[0] else 1.0)
+    scales = side.model.components, priors(side.protocol)
+    now, stated = (float(each.impulses(side.alpha, np.ones(1))[0]) for each in scales)
+    return side.protocol.priors.late_pull * (now / stated if stated else 1.0)
 
 
 def _unlike_air_sd(side: Side) -> float | None:
