@@ -237,9 +237,9 @@ class DropModel:
         start = np.maximum(start, LOWEST_START)
         gains, places = np.split(parameters[..., COMMON:], 2, axis=-1)
         places += record.strikes
-        # No string pulls so much, or pushes: NaN keeps a fit from ending here.
-        off = gains - max(float(np.mean(ANY_ALPHA)), record.alpha)
-        gains = np.where(np.abs(off) > HUBER * any_alpha_sd(), math.nan, gains)
+        # No string pulls more, or pushes: a step beyond gains nothing.
+        middle, most = max(float(np.mean(ANY_ALPHA)), record.alpha), HUBER * any_alpha_sd()
+        gains = np.clip(gains, middle - most, middle + most)
         return struck_trajectory(
             release, start, gravity, gains, record.ratios, places, kappa, record.air
         )
