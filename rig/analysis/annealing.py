@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.analysis.chain_records import ChainRecord, EdgeTrain
+from rig.analysis.chain_records import WIDER, ChainRecord, EdgeTrain
 from rig.analysis.components import ANY_ALPHA, any_alpha_sd
 from rig.analysis.departures import LOWEST_START
 from rig.analysis.free_flight import FAINT
@@ -113,28 +113,50 @@ class Pairing:
         Time and burst of every observed edge, see `rig.analysis.chain_records.EdgeTrain`.
     kind
         Kind of each: twice the number of its train, plus 1 if it darkens the beam.
-    kinds
-        Kind of every expected edge.
+    other
+        Observed edge at the other end of its shadow, −1 if there is none.
+    kinds, rods
+        Kind and rod of every expected edge.
+    widths
+        Width of the rod of every expected edge, m.
     """
 
     times: Array
     burst: Array
     kind: Index
+    other: Index
     kinds: Index
+    rods: Index
+    widths: Array
 
     @classmethod
-    def of(cls, trains: Sequence[EdgeTrain]) -> Pairing:
-        """Return the pairing of a side's trains."""
+    def of(cls, trains: Sequence[EdgeTrain], widths: Sequence[float] = ()) -> Pairing:
+        """Return the pairing of a side's trains.
+
+        Parameters
+        ----------
+        widths
+            Widths of the chain's rods, m; if empty, shadows may be of any length.
+        """
         none = np.zeros(0, dtype=np.intp)
+        blocked = np.concatenate([none, *(train.blocked for train in trains)])
+        rods = np.concatenate([none, *(train.rods for train in trains)])
         kind, kinds = (
             np.concatenate([none, *(2 * n + sides for n, sides in enumerate(states))])
             for states in ([gate.blocked for gate in trains], [gate.blocks for gate in trains])
         )
-        times, burst = (
-            np.concatenate([np.zeros(0), *values])
-            for values in ([gate.times for gate in trains], [gate.burst for gate in trains])
+        partner = np.full(blocked.size, -1)
+        begins = np.flatnonzero((kind[1:] == kind[:-1] - 1) & (blocked[:-1] > blocked[1:]))
+        partner[begins], partner[begins + 1] = begins + 1, begins
+        return cls(
+            np.concatenate([np.zeros(0), *(train.times for train in trains)]),
+            np.concatenate([np.zeros(0), *(train.burst for train in trains)]),
+            kind,
+            partner,
+            kinds,
+            rods,
+            np.array(widths)[rods] if widths else np.full(rods.size, np.inf),
         )
-        return cls(times, burst, kind, kinds)
 
     @cached_property
     def pairs(self) -> tuple[Index, Index]:
@@ -171,13 +193,13 @@ class Pairing:
         clutter = STRAYS * math.sqrt(2.0 * math.pi) / (1.0 - MISSED)
         return Weights(side, off, width, density / (clutter + density.sum(-1, keepdims=True)))
 
-    def chosen(self, weights: Weights) -> Index:
+    def chosen(self, weights: Weights, speeds: Array) -> Index:
         """Match edges and rods' sides one to one, where the weight is above ½.
 
         Parameters
         ----------
-        weights
-            Of a single fall.
+        weights, speeds
+            Weights and speeds of a single fall.
 
         Returns
         -------
@@ -190,6 +212,21 @@ class Pairing:
         order = np.argsort(-far, kind="stable")
         edge_of = np.full(self.kinds.size, -1)
         edge_of[weights.side[edges, which][order]] = edges[order]
+        return self._whole(edge_of, speeds)
+
+    def _whole(self, edge_of: Index, speeds: Array) -> Index:
+        """Remove matches of the top rod to shadows longer than its width.
+
+        A rebounding rod lengthens these shadows, and no later rod helps to separate the two.
+        """
+        last = self.rods.max(initial=0)
+        sides = np.flatnonzero((edge_of >= 0) & (self.rods == last))
+        sides = sides[self.other[edge_of[sides]] >= 0]
+        edges = edge_of[sides]
+        partner = self.other[edges]
+        # At uniform acceleration, distance is time times the mean of both speeds.
+        length = np.abs(self.times[edges] - self.times[partner]) * (speeds[edges] + speeds[partner])
+        edge_of[sides[0.5 * length > WIDER * self.widths[sides]]] = -1
         return edge_of
 
     def match(self, levels: Array, heights: Array, speeds: Array, scale: Array) -> Index:
@@ -212,7 +249,7 @@ class Pairing:
         """
         if not levels.size or not self.times.size:
             return np.full(levels.size, -1)
-        return self.chosen(self.weights(levels, heights, speeds, scale))
+        return self.chosen(self.weights(levels, heights, speeds, scale), speeds)
 
 
 class FallFit(NamedTuple):
@@ -411,7 +448,7 @@ class SideFall:
         self, fall: Array, weights: Weights, height: Array, speed: Array, lost: float
     ) -> FallFit:
         """Match a fall's edges one to one, and compute its evidence."""
-        edges = self.pairing.chosen(weights)
+        edges = self.pairing.chosen(weights, speed)
         sides = np.flatnonzero(edges >= 0)
         sigma = np.minimum(_BROADER * self.sigma, self.slack)[sides]
         off = height[edges[sides]] - self.levels[sides]

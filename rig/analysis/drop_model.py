@@ -139,7 +139,10 @@ class DropModel:
     @cached_property
     def pairings(self) -> dict[str, Pairing]:
         """Edges of each side, prepared for matching."""
-        return {role: Pairing.of(record.trains) for role, record in self.records.items()}
+        return {
+            role: Pairing.of(record.trains, record.rebound_widths)
+            for role, record in self.records.items()
+        }
 
     def side(self, role: str) -> SideFall:
         """Return a side for annealing; all other unknowns count as scatter of its edges."""

@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 
 from rig.analysis.annealing import MISSED, STRAYS
-from rig.analysis.chain_records import QUICK, ChainRecord, EdgeTrain
+from rig.analysis.chain_records import QUICK, WIDER, ChainRecord, EdgeTrain
 from rig.analysis.fit import Fit
 from rig.analysis.joint_step import JointDrop
 from rig.analysis.trajectory import Trajectory
@@ -37,9 +37,6 @@ ABSENT = -math.log(MISSED)
 """Cost of a missed edge: −ln of its prior probability."""
 SURPLUS = -math.log(STRAYS * QUICK)
 """Cost of a stray edge: −ln of its prior probability within the time of a flicker."""
-_WIDER = 1.2
-"""Factor by which an object's width in a beam may differ from the stated one: if the beam passes
-half a radius off its middle, the chord is 13 % shorter."""
 UNEXPLAINED: EdgeClass = "extra"
 """Class of unexplained edges; ``accept`` of a protocol limits their share."""
 
@@ -176,10 +173,10 @@ def _later_passages(
     if not dark.all():  # else the timer records no ends of shadows
         # Each shadow begins as the beam darkens and ends with the next edge.
         shadow = (
-            dark[:-1] & ~dark[1:] & (np.diff(times) * speed * _WIDER >= min(record.chain.widths))
+            dark[:-1] & ~dark[1:] & (np.diff(times) * speed * WIDER >= min(record.chain.widths))
         )
         begins = begins[:-1][shadow[first + 1 :]]
         ends = begins + 1
-    paired = times[begins[1:]] - times[ends[:-1]] < 2.0 * speed * _WIDER / gravity
+    paired = times[begins[1:]] - times[ends[:-1]] < 2.0 * speed * WIDER / gravity
     back[begins] = back[ends] = np.append(paired, True) | np.append(False, paired)
     return back
