@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.analysis.chain_records import WIDER, ChainRecord, EdgeTrain
-from rig.analysis.components import ANY_ALPHA, any_alpha_sd
+from rig.analysis.chain_records import ChainRecord, EdgeTrain
+from rig.analysis.components import ALPHA_SD, ANY_ALPHA
 from rig.analysis.departures import LOWEST_START
 from rig.analysis.free_flight import FAINT
 from rig.analysis.trajectory import (
@@ -113,50 +113,48 @@ class Pairing:
         Time and burst of every observed edge, see `rig.analysis.chain_records.EdgeTrain`.
     kind
         Kind of each: twice the number of its train, plus 1 if it darkens the beam.
-    other
-        Observed edge at the other end of its shadow, −1 if there is none.
-    kinds, rods
-        Kind and rod of every expected edge.
-    widths
-        Width of the rod of every expected edge, m.
+    lasting
+        Duration of the shadow that each is an end of, s; 0 if it is of none.
+    kinds
+        Kind of every expected edge.
+    longest
+        Length of the longest shadow that every expected edge may be an end of, m.
     """
 
     times: Array
     burst: Array
     kind: Index
-    other: Index
+    lasting: Array
     kinds: Index
-    rods: Index
-    widths: Array
+    longest: Array
 
     @classmethod
-    def of(cls, trains: Sequence[EdgeTrain], widths: Sequence[float] = ()) -> Pairing:
+    def of(cls, trains: Sequence[EdgeTrain], top_shadow: float = math.inf) -> Pairing:
         """Return the pairing of a side's trains.
 
         Parameters
         ----------
-        widths
-            Widths of the chain's rods, m; if empty, shadows may be of any length.
+        top_shadow
+            Length of the longest shadow that belongs to the top rod, m.
         """
         none = np.zeros(0, dtype=np.intp)
-        blocked = np.concatenate([none, *(train.blocked for train in trains)])
-        rods = np.concatenate([none, *(train.rods for train in trains)])
-        kind, kinds = (
-            np.concatenate([none, *(2 * n + sides for n, sides in enumerate(states))])
-            for states in ([gate.blocked for gate in trains], [gate.blocks for gate in trains])
+        rods, kind, kinds = (
+            np.concatenate([none, *values])
+            for values in (
+                [train.rods for train in trains],
+                [2 * n + train.blocked for n, train in enumerate(trains)],
+                [2 * n + train.blocks for n, train in enumerate(trains)],
+            )
         )
-        partner = np.full(blocked.size, -1)
-        begins = np.flatnonzero((kind[1:] == kind[:-1] - 1) & (blocked[:-1] > blocked[1:]))
-        partner[begins], partner[begins + 1] = begins + 1, begins
-        return cls(
-            np.concatenate([np.zeros(0), *(train.times for train in trains)]),
-            np.concatenate([np.zeros(0), *(train.burst for train in trains)]),
-            kind,
-            partner,
-            kinds,
-            rods,
-            np.array(widths)[rods] if widths else np.full(rods.size, np.inf),
+        times, burst = (
+            np.concatenate([np.zeros(0), *values])
+            for values in ([train.times for train in trains], [train.burst for train in trains])
         )
+        lasting = np.zeros(times.size)
+        begins = np.flatnonzero((kind[1:] == kind[:-1] - 1) & (kind[:-1] % 2 > 0))
+        lasting[begins] = lasting[begins + 1] = times[begins + 1] - times[begins]
+        longest = np.where(rods == rods.max(initial=0), top_shadow, math.inf)
+        return cls(times, burst, kind, lasting, kinds, longest)
 
     @cached_property
     def pairs(self) -> tuple[Index, Index]:
@@ -206,27 +204,14 @@ class Pairing:
         ndarray
             The observed edge of every expected edge, −1 if missed; shape ``(expected,)``.
         """
-        edges, which = np.nonzero(weights.weight > 0.5)
+        # A rebounding top rod lengthens its shadow, and no later rod helps to separate the two.
+        short = (self.lasting * speeds)[:, None] <= self.longest[weights.side]
+        edges, which = np.nonzero(short & (weights.weight > 0.5))
         # Of several edges the nearest, in units of σ, is written last and so stays.
         far = np.abs(weights.off[edges, which]) / weights.sigma[edges, which]
         order = np.argsort(-far, kind="stable")
         edge_of = np.full(self.kinds.size, -1)
         edge_of[weights.side[edges, which][order]] = edges[order]
-        return self._whole(edge_of, speeds)
-
-    def _whole(self, edge_of: Index, speeds: Array) -> Index:
-        """Remove matches of the top rod to shadows longer than its width.
-
-        A rebounding rod lengthens these shadows, and no later rod helps to separate the two.
-        """
-        last = self.rods.max(initial=0)
-        sides = np.flatnonzero((edge_of >= 0) & (self.rods == last))
-        sides = sides[self.other[edge_of[sides]] >= 0]
-        edges = edge_of[sides]
-        partner = self.other[edges]
-        # At uniform acceleration, distance is time times the mean of both speeds.
-        length = np.abs(self.times[edges] - self.times[partner]) * (speeds[edges] + speeds[partner])
-        edge_of[sides[0.5 * length > WIDER * self.widths[sides]]] = -1
         return edge_of
 
     def match(self, levels: Array, heights: Array, speeds: Array, scale: Array) -> Index:
@@ -327,7 +312,7 @@ class SideFall:
         sd[CLOCK] = clock_u
         sd[PULL] = ANY_GRAVITY if protocol.surface is None else protocol.gravity.u
         if record.ratios is not None:
-            sd[ALPHA] = any_alpha_sd()
+            sd[ALPHA] = ALPHA_SD
         return cls(record, pairing, stated, sd, sigma)
 
     @cached_property

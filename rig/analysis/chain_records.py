@@ -7,6 +7,7 @@ before the rod strikes the surface, or rods that lie on it.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -198,10 +199,10 @@ class ChainRecord:
         return float(min(np.diff(places) if len(places) > 1 else widths))
 
     @property
-    def rebound_widths(self) -> Sequence[float]:
-        """Widths of the rods if rebounding rods may cross their beams, m; else empty."""
+    def top_shadow(self) -> float:
+        """Length of the longest shadow that belongs to the top rod, which may rebound, m."""
         thrown = self.ratios is not None and self.chain.chain.rods > 1
-        return self.chain.widths if thrown else ()
+        return WIDER * self.chain.widths[-1] if thrown else math.inf
 
     @property
     def edge_count(self) -> int:

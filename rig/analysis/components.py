@@ -14,6 +14,8 @@ from rig.protocol.protocol import Priors, Protocol
 _DEFAULT = Priors()
 ANY_ALPHA = (-0.10, 0.60)
 """Range of the impact coefficient: energy allows 0 to ½, with a margin at both ends."""
+ALPHA_SD = float(np.ptp(ANY_ALPHA)) / math.sqrt(12.0)
+"""Standard deviation of a uniform distribution over this range."""
 SHARPEST = 1e-6
 """Least scatter of an edge, m: no rod is rounder and no beam sharper, whatever is stated."""
 
@@ -101,12 +103,7 @@ class Components:
             See `rig.analysis.chain_records.ChainRecord.uneven`.
         """
         even = math.hypot(self.impulse * alpha * uneven, self.impulse_floor)
-        return np.minimum(np.hypot(even, self.bounce * alpha / above), any_alpha_sd())
-
-
-def any_alpha_sd() -> float:
-    """Return the standard deviation of a uniform distribution over `ANY_ALPHA`."""
-    return float(np.ptp(ANY_ALPHA)) / math.sqrt(12.0)
+        return np.minimum(np.hypot(even, self.bounce * alpha / above), ALPHA_SD)
 
 
 def above(chain: Chain) -> Array:

@@ -14,7 +14,7 @@ import numpy as np
 from rig.analysis import annealing
 from rig.analysis.annealing import PART, Pairing, SideFall, matched
 from rig.analysis.chain_records import ChainRecord
-from rig.analysis.components import ANY_ALPHA, SHARPEST, Components, any_alpha_sd, priors
+from rig.analysis.components import ALPHA_SD, ANY_ALPHA, SHARPEST, Components, priors
 from rig.analysis.departures import LOWEST_START, Discrepancy
 from rig.analysis.equations import HUBER, SHARED, STRAY, Equations, ExpectedEdges, Residuals, Seen
 from rig.analysis.trajectory import (
@@ -140,7 +140,7 @@ class DropModel:
     def pairings(self) -> dict[str, Pairing]:
         """Edges of each side, prepared for matching."""
         return {
-            role: Pairing.of(record.trains, record.rebound_widths)
+            role: Pairing.of(record.trains, record.top_shadow)
             for role, record in self.records.items()
         }
 
@@ -241,7 +241,7 @@ class DropModel:
         gains, places = np.split(parameters[..., COMMON:], 2, axis=-1)
         places += record.strikes
         # No string pulls more, or pushes: a step beyond gains nothing.
-        middle, most = max(float(np.mean(ANY_ALPHA)), record.alpha), HUBER * any_alpha_sd()
+        middle, most = max(float(np.mean(ANY_ALPHA)), record.alpha), HUBER * ALPHA_SD
         gains = np.clip(gains, middle - most, middle + most)
         return struck_trajectory(
             release, start, gravity, gains, record.ratios, places, kappa, record.air

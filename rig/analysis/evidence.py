@@ -130,8 +130,10 @@ class Evidence:
         struck
             Number of these that only edges after a first impact can determine.
         """
-        new: dict[str, float] = {}
-        self._share(_EDGES, self._bin_squares(parameters, struck), new)
+        new: dict[str, float] = {name: getattr(self.components, name) for name in _EDGES}
+        edges = self._bin_squares(parameters, struck)
+        if edges.size:  # else all are those of rods that may have struck
+            self._share(_EDGES, edges, new)
         for names, members in self._members.items():
             self._share(names, np.concatenate(members, axis=1), new)
         # If chains depart from the equations, that may bias every other component.
@@ -180,9 +182,6 @@ class Evidence:
         of a, by multiplicative steps.
         """
         kinds, (squares, unsure, counts) = members[:-3], members[-3:]
-        if not squares.size:  # all edges are those of rods that may have struck
-            new.update((name, getattr(self.stated, name)) for name in names)
-            return
         stated = np.array([getattr(self.stated, name) ** 2 for name in names])
         variances = np.array([getattr(self.components, name) ** 2 for name in names])
         # Spread the prior's members over all rows, so that no component is favoured.

@@ -143,11 +143,14 @@ class Explainer:
 
     def _is_odd(self, fit: Fit, reasons: Sequence[Reason]) -> bool:
         """Whether a fault is searched for, which takes longer than all the rest."""
-        accusing = any(reason.code in _ACCUSING for reason in reasons)
-        if accusing or is_wrong(reasons) or not well_read(fit):
-            return True
-        rods = any(self.suspects.rods.values()) or self.suspects.more
-        return rods or self._suggests_fault(fit, self.stated)
+        return (
+            any(reason.code in _ACCUSING for reason in reasons)
+            or is_wrong(reasons)
+            or not well_read(fit)
+            or any(self.suspects.rods.values())
+            or self.suspects.more
+            or self._suggests_fault(fit, self.stated)
+        )
 
     def _suggests_fault(self, fit: Fit, premise: Premise, named: Fault = _NEITHER) -> bool:
         """Whether the score test of a fitted drop favours a fault beyond those of its premise."""
@@ -174,9 +177,8 @@ class Explainer:
             # rod's distance away cannot see that.
             causes += self._by_votes(sized)
         yield from causes
-        least = stated.evidence + CLEAR
-        is_clear = any(cause.whole and cause.evidence > least for cause in causes)
-        if is_clear and "stretch" in fit.model.unknowns:
+        clear = [cause.whole and cause.evidence > stated.evidence + CLEAR for cause in causes]
+        if any(clear) and "stretch" in fit.model.unknowns:
             # The fall may depart from the equations, without a fault.
             scales = fit.model.components
             for name in _DEPARTURES:

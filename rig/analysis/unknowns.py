@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 import numpy as np
 
 from rig.analysis.chain_records import ChainRecord
-from rig.analysis.components import Components, above, priors
+from rig.analysis.components import ALPHA_SD, Components, above
 from rig.analysis.departures import MODES, drawn, lags, lever, slack, strike_u, swing_sd
 from rig.analysis.equations import SHARED, ExpectedEdges, standardise
 from rig.analysis.trajectory import COMMON, DRAG, GRAVITY, RELEASE, START
@@ -213,10 +213,10 @@ def _stretch_sd(side: Side) -> list[float]:
 
 
 def _late_sd(side: Side) -> float:
-    """Prior of the late pull, in proportion to the scatter of the last pull that edges measure."""
-    scales = side.model.components, priors(side.protocol)
-    now, stated = (float(each.impulses(side.alpha, np.ones(1))[0]) for each in scales)
-    return side.protocol.priors.late_pull * (now / stated if stated else 1.0)
+    """Prior of the late pulls, in proportion to bouncing: no edge measures them."""
+    priors, most = side.protocol.priors, ALPHA_SD / max(side.alpha, 1e-9)
+    stated = min(priors.last_impulse, most)
+    return priors.late_pull * (min(side.model.components.bounce, most) / stated if stated else 1.0)
 
 
 def _unlike_air_sd(side: Side) -> float | None:
