@@ -69,7 +69,7 @@ class Discrepancy:
     lead
         Distance by which impacts bring the chain ahead of a free fall until the last, m.
     late_pull, late_way
-        Gain of speed of the top rod by the impulses that come after its last passage of a beam, m/s
+        Gain of speed of the top rod for α = 1 by the impulses after its last passage of a beam, m/s
         (at least by the last, which may come late), and the distance over which they come, m.
     """
 
@@ -105,9 +105,8 @@ class Discrepancy:
         seeing = [train for train in record.trains if strikes.size - 1 in train.rods]
         lowest = min((protocol.gates.gates[beam.gate].height for beam in seeing), default=gap)
         unseen = strikes[-1] - strikes[:-1] <= max(lowest, gap)
-        pulls = (nominal.hits.ratio * nominal.hits.arrival)[:-1]
-        pull, whole = abs(record.alpha) * float(pulls @ unseen), float(np.ptp(strikes))
-        return cls(nominal, stretch, lead, pull, min(max(lowest, 0.0), whole))
+        pulls, whole = (nominal.hits.ratio * nominal.hits.arrival)[:-1], float(np.ptp(strikes))
+        return cls(nominal, stretch, lead, float(pulls @ unseen), min(max(lowest, 0.0), whole))
 
     def top(self, levels: Array) -> Array:
         """Return the modes of the top rod for levels of the reference point, m."""

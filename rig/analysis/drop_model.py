@@ -240,9 +240,9 @@ class DropModel:
         start = np.maximum(start, LOWEST_START)
         gains, places = np.split(parameters[..., COMMON:], 2, axis=-1)
         places += record.strikes
-        # No string pulls more, or pushes: a step beyond gains nothing.
-        middle, most = max(float(np.mean(ANY_ALPHA)), record.alpha), HUBER * ALPHA_SD
-        gains = np.clip(gains, middle - most, middle + most)
+        # No string pulls or pushes more: a step beyond gains nothing.
+        middle, most = float(np.mean(ANY_ALPHA)), HUBER * ALPHA_SD
+        gains = np.clip(gains, middle - most, max(middle, record.alpha) + most)
         return struck_trajectory(
             release, start, gravity, gains, record.ratios, places, kappa, record.air
         )

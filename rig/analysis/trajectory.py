@@ -30,6 +30,8 @@ ONE = np.ones(1)
 COMMON = 4
 RELEASE, START, GRAVITY, DRAG = range(COMMON)
 """Columns of every trajectory's derivatives: release time, start height, acceleration, κ."""
+_STILL = float(np.finfo(float).eps)
+"""Least share of its speed that a chain keeps at an impact: trial steps may give less than 0."""
 _NORMAL = math.sqrt(2.0 / math.pi)
 """Slope at 0 of 2Φ(z) − 1, with Φ the normal distribution; tanh of it follows to 2 %."""
 _FAINT = 1e-3
@@ -257,7 +259,7 @@ class Trajectory:
         distance, arrival, gains, ratio = self.hits
         row = np.arange(arrival.shape[-1])
         kappa, share = self.kappas(row), self.shares(row)
-        factor = 1.0 + gains
+        factor = np.maximum(1.0 + gains, _STILL)
         d_factor = ratio[:, None] * gain
         d_height = np.concatenate([common[[START]], -places])
         ways = d_height[:-1] - d_height[1:]
@@ -365,7 +367,7 @@ def struck_trajectory(
     height[..., :1], height[..., 1:] = start, -places
     distance = height[..., :-1] - height[..., 1:]
     kappas = some_air(kappa * (float(air[0]) if air.size == 1 else air[: gain.shape[-1]]))
-    reach, factor = reach_of(distance, kappas), 1.0 + gain
+    reach, factor = reach_of(distance, kappas), np.maximum(1.0 + gain, _STILL)
     squares = _sum_legs(1.0 - kappas * reach, factor, gravity * reach)
     arrival = np.sqrt(np.maximum(squares, 0.0))
     speed, time = np.zeros_like(height), np.zeros_like(height)

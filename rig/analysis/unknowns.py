@@ -213,10 +213,10 @@ def _stretch_sd(side: Side) -> list[float]:
 
 
 def _late_sd(side: Side) -> float:
-    """Prior of the late pulls, in proportion to bouncing: no edge measures them."""
-    priors, most = side.protocol.priors, ALPHA_SD / max(side.alpha, 1e-9)
-    stated = min(priors.last_impulse, most)
-    return priors.late_pull * (min(side.model.components.bounce, most) / stated if stated else 1.0)
+    """Prior of α of the late pulls, in proportion to bouncing: no edge measures it."""
+    priors, scatter = side.protocol.priors, side.alpha * side.model.components.bounce
+    share = min(scatter, ALPHA_SD) / priors.last_impulse if priors.last_impulse else side.alpha
+    return priors.late_pull * share
 
 
 def _unlike_air_sd(side: Side) -> float | None:
