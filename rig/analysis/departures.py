@@ -105,8 +105,8 @@ class Discrepancy:
         seeing = [train for train in record.trains if strikes.size - 1 in train.rods]
         lowest = min((protocol.gates.gates[beam.gate].height for beam in seeing), default=gap)
         unseen = strikes[-1] - strikes[:-1] <= max(lowest, gap)
-        pulls, whole = (nominal.hits.ratio * nominal.hits.arrival)[:-1], float(np.ptp(strikes))
-        return cls(nominal, stretch, lead, float(pulls @ unseen), min(max(lowest, 0.0), whole))
+        pulls, length = (nominal.hits.ratio * nominal.hits.arrival)[:-1], float(np.ptp(strikes))
+        return cls(nominal, stretch, lead, float(pulls @ unseen), min(max(lowest, 0.0), length))
 
     def top(self, levels: Array) -> Array:
         """Return the modes of the top rod for levels of the reference point, m."""

@@ -127,7 +127,7 @@ class AdjustedDrop:
 
     @property
     def late(self) -> Dual:
-        """Gain of speed of the top rod by a late last pull, m/s."""
+        """Gain of speed of the top rod by late pulls, m/s."""
         return self.linear("late", self.model.discrepancy.late_pull)
 
     @cached_property
@@ -137,7 +137,7 @@ class AdjustedDrop:
         This is the path with first-order corrections.
 
         The top rod is ahead of its place by w and faster than its chain by w′: it arrives
-        e = w/(V + w′) earlier, and slower by g·e. A late pull acts over the distance below the
+        e = w/(V + w′) earlier, and slower by g·e. Late pulls act over the distance below the
         lowest beam. All are small, and second-order terms are left out.
         """
         path, level = self._path("impact"), -self.model.records["impact"].strikes[-1:]

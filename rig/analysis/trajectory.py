@@ -259,7 +259,7 @@ class Trajectory:
         distance, arrival, gains, ratio = self.hits
         row = np.arange(arrival.shape[-1])
         kappa, share = self.kappas(row), self.shares(row)
-        factor = np.maximum(1.0 + gains, _STILL)
+        factor = 1.0 + gains
         d_factor = ratio[:, None] * gain
         d_height = np.concatenate([common[[START]], -places])
         ways = d_height[:-1] - d_height[1:]
@@ -362,12 +362,12 @@ def struck_trajectory(
     Trajectory
         Its parameters are the `COMMON` first, then α of each rod, then the place of each rod.
     """
-    gain = gains * ratios
+    gain = np.maximum(gains * ratios, _STILL - 1.0)
     height = np.empty((*gain.shape[:-1], gain.shape[-1] + 1))
     height[..., :1], height[..., 1:] = start, -places
     distance = height[..., :-1] - height[..., 1:]
     kappas = some_air(kappa * (float(air[0]) if air.size == 1 else air[: gain.shape[-1]]))
-    reach, factor = reach_of(distance, kappas), np.maximum(1.0 + gain, _STILL)
+    reach, factor = reach_of(distance, kappas), 1.0 + gain
     squares = _sum_legs(1.0 - kappas * reach, factor, gravity * reach)
     arrival = np.sqrt(np.maximum(squares, 0.0))
     speed, time = np.zeros_like(height), np.zeros_like(height)

@@ -214,8 +214,9 @@ def _stretch_sd(side: Side) -> list[float]:
 
 def _late_sd(side: Side) -> float:
     """Prior of α of the late pulls, in proportion to bouncing: no edge measures it."""
-    priors, scatter = side.protocol.priors, side.alpha * side.model.components.bounce
-    share = min(scatter, ALPHA_SD) / priors.last_impulse if priors.last_impulse else side.alpha
+    priors, bounce = side.protocol.priors, side.alpha * side.model.components.bounce
+    most = max(ALPHA_SD, side.alpha * priors.last_impulse)
+    share = min(bounce, most) / priors.last_impulse if priors.last_impulse else side.alpha
     return priors.late_pull * share
 
 

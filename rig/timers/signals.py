@@ -211,13 +211,13 @@ class SignalReader:
         clock, _, label = self.signals[n]
         samples = np.array(self.samples[n]).reshape(-1, 3)
         level, crossings = find_crossings(samples)
-        low, high = (limit(samples[:, 2], default=0.0) for limit in (min, max))
         code, values = "crossings", {"crossings": len(crossings), "level": level}
         if level is None:
+            low, high = (limit(samples[:, 2], default=0.0) for limit in (min, max))
             code, values = "no_passage", {"low": low, "high": high}
         self.file.notes.append(make_reason(code, input=label, **values))
         for line, offset, is_high in crossings.tolist():
-            tick = self.starts[clock.at] + round(offset)
+            tick = self.starts[clock.at] + round(offset)  # and 3 is low in `STATES`, 4 high
             self.changes.append((int(line), tick, 3 + int(is_high), *self._place_of(n, row), False))
 
     def _reject(self, row: Row, column: TimerColumn, text: str) -> None:

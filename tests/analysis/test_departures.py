@@ -235,8 +235,13 @@ def test_all_pulls_that_no_beam_sees_may_come_late_and_the_last_in_any_case(lowe
 
 
 def test_the_strongest_pulls_that_a_protocol_may_state_are_measured():
-    strong = parse(SINGLE.text.replace("A: {rods", "A: {alpha: 1, rods"))
-    one = case(strong, Dials.quiet())
+    one = case(parse(SINGLE.text.replace("A: {rods", "A: {alpha: 1, rods")), Dials.quiet())
     result = one.analyze()
     assert result.verdict == "accepted"
     assert_true(result, one.truth, names=["speed_m_s"])
+
+
+def test_late_pulls_are_as_uncertain_as_stated_however_wide_the_last_impulse_is():
+    text = f"{SINGLE.text}priors: {{last_impulse: 200 %}}\n"
+    model, *_ = replace(case(SINGLE), protocol=parse(text)).model()
+    assert model.unknowns.sd[model.unknowns["late"]] == pytest.approx(0.25 * model.alpha)

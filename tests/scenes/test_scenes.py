@@ -41,17 +41,15 @@ def test_many_more_scenes_go_through_every_command(seed, call, tmp_path):
 def test_a_scene_of_which_edges_say_little_is_analysed_as_far_as_they_do(seed, tmp_path):
     """No edge but of rods that may have struck; one gate that sees a rod after any strike."""
     odd = scene(seed)
-    path = tmp_path / "scene.yaml"
-    path.write_text(odd.text, encoding="utf-8")
+    (path := tmp_path / "scene.yaml").write_text(odd.text, encoding="utf-8")
     runs = [run.number for run in planned(odd.protocol)]
     drops = [*falls([Asked(simulation(path, url=odd.port), [seed], [runs])])]
-    scale = time_scale(seed)
-    results = analyze(odd.protocol, [fall.drop for fall in drops], lambda _: scale).runs
+    results = analyze(odd.protocol, [fall.drop for fall in drops], lambda _: time_scale(seed)).runs
     for result, fall in zip(results, drops, strict=True):
         assert result.verdict == "accepted"
         for name, measured in result.quantities.items():
-            true = fall.truth.get(name, measured.value)
-            assert abs(measured.value - true) < 2.0 * measured.expanded, name
+            error = fall.truth.get(name, measured.value) - measured.value
+            assert abs(error) < 2.0 * measured.expanded, name
 
 
 PRIORS = SECTIONS["priors"]
