@@ -494,8 +494,17 @@ class SideFall:
             yield falls[order[self._unlike(falls[order])] if order.size else order]
 
     def most_votes(self) -> int:
-        """Return the most votes for any fall of the grid's first, likeliest batch."""
-        return int(self._count_votes(self.nodes()[:_BATCH])[1].max(initial=0))
+        """Return how many edges agree with the likeliest fall of the grid's first batch.
+
+        Of several edges that agree with the same side of a rod, one counts.
+        """
+        falls, votes = self._count_votes(self.nodes()[:_BATCH])
+        if not votes.any():
+            return 0
+        fall, (edge, side) = falls[[votes.argmax()]], self.pairing.pairs
+        heights, _ = self.path(fall).heights(self.since(fall, self.pairing.times))
+        near = np.abs(heights[0, edge] - self.levels[side]) <= self.slack
+        return min(np.unique(edge[near]).size, np.unique(side[near]).size)
 
     def _count_votes(self, nodes: Array, earliest: float = -np.inf) -> tuple[Array, Index]:
         """Count, for each grid point, the edges that agree on a release time (Hough transform).

@@ -188,8 +188,7 @@ def few_edges(shares: Mapping[str, float], words: Vocabulary) -> dict[str, Reaso
 def most_votes(protocol: Protocol, record: ChainRecord, clock_u: float) -> int:
     """Return how many of a side's edges agree on a fall near the stated values, at most."""
     pairing = Pairing.of(record.trains, record.top_shadow)
-    votes = SideFall.of(protocol, record, pairing, clock_u).most_votes()
-    return min(votes, possible(record))  # many edges of a flicker vote for the same rod
+    return SideFall.of(protocol, record, pairing, clock_u).most_votes()
 
 
 def well_read(fit: Fit) -> bool:

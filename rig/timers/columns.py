@@ -145,6 +145,8 @@ def columns_of(
     columns = [_read_column(block, heading, n, facts[n] | shared, cells[n]) for n in facts]
     for column in columns:
         column.filled = len(cells[column.at]) / len(rows)
+        is_said = column.role in {"state", "cleared"} and "any.beam" in facts[column.at]
+        file.facts |= {"beam"} if is_said else set()
     if heading is None:
         if any(row.count_known() > 1 and len(row.texts) > width for row in block.headings):
             file.problems.refuse(block.headings[0].line, "heading_unfit", columns=width)

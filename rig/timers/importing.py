@@ -114,7 +114,6 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
     readings = _find_readings(options, gates, bars)
     reading, match = readings[0], FallMatch(0.0)
     if not options.as_read:
-        readings = [reading for reading in readings if reading.is_whole] or readings
         reading, match = _choose(readings, place, fit)
         _refuse_impossible(reading, place)
     notes = [*reading.file.notes, _account(reading, options)]
@@ -167,13 +166,14 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
     well.
     """
     distinct = [*{x.key: x for x in reversed(readings)}.values()][::-1]
-    if len(distinct) == 1 and "channels" in distinct[0].file.stated:
-        return distinct[0], fit(distinct[0], True)
+    usual = [reading for reading in distinct if reading.is_whole] or distinct
+    if len(usual) == 1 and "channels" in usual[0].file.stated:
+        return usual[0], fit(usual[0], True)
     rough = sorted(((fit(x, False), x) for x in distinct), key=lambda row: -row[0].share)
     likely = [x for match, x in rough if match.share >= x.least_share]
     exact = [(fit(x, True), x) for x in likely[:_FINALISTS]]
     ranked = [row for row in exact if row[0].share >= row[1].least_share]
-    ranked.sort(key=lambda row: _DECISIVE * row[1].layout.contradictions - row[0].evidence)
+    ranked.sort(key=lambda row: _DECISIVE * row[1].oddities - row[0].evidence)
     if not ranked:
         match, best = (exact or rough)[0]
         is_open = [x for _, x in rough if x.layout.dark not in {"states", "inverted"}]
@@ -183,7 +183,7 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
         line = best.line[best.parts[match.worst]].min()
         raise refusal(f"{place}:{line}:1", "no_reading_fits", **values)
     (match, reading), *rest = ranked
-    rivals = [x for x in rest if x[1].layout.contradictions == reading.layout.contradictions]
+    rivals = [x for x in rest if x[1].oddities == reading.oddities]
     if rivals and match.evidence - rivals[0][0].evidence < _DECISIVE:
         options = f"{reading.layout} or {rivals[0][1].layout}"
         raise refusal(place, "several_readings", options=options)

@@ -66,8 +66,8 @@ class FileLayout(NamedTuple):
 
     @property
     def contradictions(self) -> int:
-        """Count what is contrary to what the file says, or to what its first rows usually say."""
-        return (self.dark == "inverted") + (self.first == "change")
+        """Count what is contrary to what the file says, or to how files usually are."""
+        return (self.dark == "inverted") + (self.first == "change") + (self.groups == "unsorted")
 
     @property
     def text(self) -> str:
@@ -89,8 +89,6 @@ class FileReading:
 
     Attributes
     ----------
-    least_share
-        Of the edges near a fall's, of all that came or were due, for it to be credible.
     runs
         Their numbers, in order.
     parts
@@ -106,8 +104,6 @@ class FileReading:
 
     def __init__(self, file: TimerFile, layout: FileLayout) -> None:
         self.file, self.layout = file, layout
-        is_guess = "guess" in file.facts or layout.groups == "passing"
-        self.least_share = _GOOD_GUESS if is_guess else _GOOD
         changes, drop = group_changes(file, layout.unit, layout.groups, layout.pause_s)
         label, names = changes["label"], [*file.names]
         channels = [layout.channels.get(name, -1) for name in names]
@@ -161,6 +157,18 @@ class FileReading:
         """What is the same for readings of the same edges."""
         columns = self.run, self.tick, self.channel, self.blocked
         return hash(tuple(tuple(column.tolist()) for column in columns))
+
+    @property
+    def least_share(self) -> float:
+        """Share of the edges near a fall's, of all that came or were due, that is credible."""
+        is_guess = "guess" in self.file.facts or self.layout.groups in {"passing", "unsorted"}
+        is_broken = self.layout.dark.startswith("turns") and not self.is_whole
+        return _GOOD_GUESS if is_guess or is_broken else _GOOD
+
+    @property
+    def oddities(self) -> int:
+        """Count what is not as usual."""
+        return self.layout.contradictions + (not self.is_whole)
 
     @property
     def is_whole(self) -> bool:
@@ -231,7 +239,9 @@ def find_layouts(file: TimerFile, gates: Sequence[int], bars: int) -> Iterator[F
     changes, drop = group_changes(file, "", "runs", 0.0)
     most = 1 + count_before(drop * len(file.names) + changes["label"]).max(initial=0)
     is_signal = np.any(state > STATES.index("blocked"))
-    levels = ["high", "low"] if is_signal else ["states", "inverted"]
+    levels = (
+        ["high", "low"] if is_signal else ["states", *["inverted"] * ("beam" not in file.facts)]
+    )
     # More times than bars: it darkens and clears in turns.
     times = ["turns", "turns-clear", "each"] if most > bars else ["each", "turns", "turns-clear"]
     choices: dict[str, Sequence[Any]] = {"unit": list(POWERS)} if None in file.powers else {}
