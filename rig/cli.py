@@ -51,7 +51,8 @@ def _run(argv: Sequence[str] | None) -> int:
         argcomplete.autocomplete(_parser())
     struck: list[object] = []
     try:
-        seen = sys.stdin.isatty() and sys.stdout.isatty()
+        # A stream that is closed is `None`.
+        seen = all(stream and stream.isatty() for stream in (sys.stdin, sys.stdout))
         return _carry_out((sys.argv[1:] if argv is None else [*argv]) or ["tui"] * seen, struck)
     except RigError as error:
         from rig.command_help import runnable  # noqa: PLC0415 - `rig --help` needs none of it

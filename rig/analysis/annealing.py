@@ -51,7 +51,7 @@ _RECORD = 4.0
 _NODES = 400
 _BATCH = 8  # grid points of the first batch
 PEAKS = 5
-"""Starts of a batch that are annealed."""
+"""Starts of a batch that are annealed, and faults that are fitted of each kind of search."""
 _ALIKE = 0.75
 """Share of equally assigned edges above which two starts converge to the same fall."""
 LEAST = 0.6
@@ -494,16 +494,15 @@ class SideFall:
             yield falls[order[self._unlike(falls[order])] if order.size else order]
 
     def most_votes(self) -> int:
-        """Return how many edges agree with the likeliest fall of the grid's first batch.
+        """Return the most votes for any fall of the grid's first, likeliest batch."""
+        return int(self._count_votes(self.nodes()[:_BATCH])[1].max(initial=0))
 
-        Of several edges that agree with the same side of a rod, one counts.
-        """
+    def most_matches(self) -> int:
+        """Return how many edges agree, each with a side of its own, with the fall of most votes."""
         falls, votes = self._count_votes(self.nodes()[:_BATCH])
-        if not votes.any():
-            return 0
-        fall, (edge, side) = falls[[votes.argmax()]], self.pairing.pairs
+        fall, (edge, side) = falls[np.argsort(-votes)[:1]], self.pairing.pairs
         heights, _ = self.path(fall).heights(self.since(fall, self.pairing.times))
-        near = np.abs(heights[0, edge] - self.levels[side]) <= self.slack
+        _, near = np.nonzero(np.abs(heights[:, edge] - self.levels[side]) <= self.slack)
         return min(np.unique(edge[near]).size, np.unique(side[near]).size)
 
     def _count_votes(self, nodes: Array, earliest: float = -np.inf) -> tuple[Array, Index]:

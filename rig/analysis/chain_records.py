@@ -128,15 +128,6 @@ class EdgeArrays:
             np.bincount(channels, minlength=1),
         )
 
-    def of_channel(self, channel: int) -> slice:
-        """Return the slice of a channel's edges."""
-        return slice(*np.searchsorted(self.channels, [channel, channel + 1]).tolist())
-
-    def count_thinned(self, channel: int) -> int:
-        """Return the number of a channel's edges that were left out."""
-        received = int(self.received[channel]) if channel < self.received.size else 0
-        return received - int(np.count_nonzero(self.channels == channel))
-
 
 @dataclass(frozen=True, slots=True)
 class ChainRecord:
@@ -247,7 +238,8 @@ def edge_train(
         Height above the contact point at which each rod stops, m: no passage is expected below;
         `None` for a free chain.
     """
-    at_gate = edges.of_channel(gate.channel)
+    channel = gate.channel
+    at_gate = slice(*np.searchsorted(edges.channels, [channel, channel + 1]).tolist())
     # Some timers record only edges that darken a beam.
     darkening = bool(edges.blocked.size and edges.blocked.all())
     return EdgeTrain(
@@ -257,7 +249,7 @@ def edge_train(
         edges.burst[at_gate],
         edges.numbers[at_gate],
         *_passages(gate.height, chain, start, higher, darkening),
-        edges.count_thinned(gate.channel),
+        int(edges.received[channel : channel + 1].sum()) - edges.times[at_gate].size,
     )
 
 

@@ -78,11 +78,6 @@ class GateCount(NamedTuple):
         """Whether it did not see the first or the last rod; by chance, it may be any."""
         return not np.isin(self.train.rods[[0, -1]], self.seen).all()
 
-    @property
-    def is_strange(self) -> bool:
-        """Whether it disagrees with its chain."""
-        return self.share < STRANGE or (self.share < RIGHT and self.missing > FEW)
-
 
 def gate_counts(records: Iterable[ChainRecord], matches: Matches | None = None) -> list[GateCount]:
     """Return the counts of all gates with edges that are expected, and observed.
@@ -121,7 +116,7 @@ def gate_reasons(fit: Fit) -> Iterator[Reason]:
     off = np.abs(standardise(estimate.x[beams], estimate.sd[beams]))
     for gate in gate_counts(records, fit.matches):
         where, deviations = _values(protocol, gate.train), float(off[gate.train.gate])
-        if gate.is_strange:
+        if gate.share < STRANGE or (gate.share < RIGHT and gate.missing > FEW):
             # A gate with few expected edges may miss a rod by chance, without effect on the result.
             code = "gate_disagrees" if gate.match.size >= 2 * SIDES else "gate_disagrees_few"
             yield make_reason(code, words, **where, share=gate.share)

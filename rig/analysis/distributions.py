@@ -12,7 +12,6 @@ from typing import Any
 COVERAGE_95 = 1.959963984540054
 """`coverage_factor` of the normal distribution, to save the import of scipy."""
 _ONCE_IN = 1e-3
-_MANY = 1e6  # beyond this the distribution is normal to all printed digits
 
 
 def special() -> Any:
@@ -40,7 +39,7 @@ def coverage_factor(degrees: float, probability: float = 0.95) -> float:
     """
     if not degrees >= 1.0:  # NaN too
         raise ValueError(f"{degrees} degrees of freedom; at least 1 is needed")
-    return float(special().stdtrit(min(degrees, _MANY), 0.5 * (1.0 + probability)))
+    return float(special().stdtrit(degrees, 0.5 * (1.0 + probability)))
 
 
 def chi2_tail(x: float, degrees: int) -> float:

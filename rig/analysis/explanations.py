@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rig.analysis.annealing import LEAST, MISSED
+from rig.analysis.annealing import LEAST, MISSED, PEAKS
 from rig.analysis.chain_records import ChainRecord, chain_records
 from rig.analysis.diagnoses import RIGHT
 from rig.analysis.faults import Fault, Premise, Suspects, faults
@@ -28,8 +28,8 @@ from rig.analysis.identify import (
     Reading,
     held_back,
     identify,
-    most_votes,
     possible,
+    side_fall,
     weigh,
     well_read,
 )
@@ -46,7 +46,6 @@ CLEAR = math.log(100.0)
 """Least log odds of a named fault against every rival and the stated protocol. Also the cost of a
 fault's prior probability: 1 drop in 100 has a given fault."""
 _NAMED = 3  # faults listed if none is clear, and moments of a brake that are fitted
-_TRIED = 5  # faults that are fitted: those with the largest score, and those with the most votes
 _DEPARTURES = "stretch", "landed", "bounce"
 _BEYOND = 10.0  # factor on the scale of a departure, in a fall that departs from the equations
 
@@ -207,7 +206,7 @@ class Explainer:
         for n in np.argsort(-gains).tolist():
             if gains[n] > least:
                 likely.setdefault(sized[n].kin, sized[n])
-        for alike in [fault.alike for fault in likely.values()][:_TRIED]:
+        for alike in [fault.alike for fault in likely.values()][:PEAKS]:
             odds = self._score_odds(fit, self.stated, alike)
             for n in np.argsort(-odds)[:_NAMED].tolist():
                 yield from self._fit_size(alike[n], 0.0, fit)
@@ -262,7 +261,7 @@ class Explainer:
             if share >= RIGHT and net >= least:
                 candidates.append((net, fault, size))
         candidates.sort(key=lambda row: -row[0])
-        for _, fault, size in candidates[:_TRIED]:
+        for _, fault, size in candidates[:PEAKS]:
             yield from self._afresh(fault, size)
 
     def _net(self, premise: Premise, least: float = -math.inf) -> tuple[float, int]:
@@ -282,7 +281,9 @@ class Explainer:
             ]
             key = record.role, *scene, *edges
             if key not in self._votes:
-                self._votes[key] = most_votes(protocol, record, self.clock_u)
+                # Many edges of a flicker vote for the same rod.
+                most = side_fall(protocol, record, self.clock_u).most_votes()
+                self._votes[key] = min(most, votes[n])
             votes[n] = self._votes[key]
         return sum(votes) / max(1, expected), 2 * sum(votes) - expected
 
@@ -298,10 +299,8 @@ class Explainer:
             return
         if fault.code == "air":
             # κ was integrated out like all other unknowns.
-            size, u = (
-                fit.model.kappa(fit.x),
-                float(fit.estimate.own_u[fit.model.unknowns["drag"]][0]),
-            )
+            size = fit.model.kappa(fit.x)
+            u = float(fit.estimate.own_u[fit.model.unknowns["drag"]][0])
         yield self._explanation(fault, fault.values(size, u), reading, premise, occam)
 
     def _fit_size(self, fault: Fault, size: float, fit: Fit) -> Iterator[Explanation]:

@@ -269,14 +269,8 @@ def _order_faults(chain: RodChain, side: str, absent: Sequence[int]) -> Iterator
 
 def _brakes(side: str) -> Iterator[Fault]:
     """Yield a side's chain braked at each moment, in either way."""
-    braked = Fault(
-        "braked",
-        lambda stated, _: stated,
-        {"side": side},
-        "size_m",
-        (0.0, _BEHIND),
-        continuous=True,
-    )
+    where, sizes = {"side": side}, (0.0, _BEHIND)
+    braked = Fault("braked", lambda same, _: same, where, "size_m", sizes, continuous=True)
     for part, power in product(range(1, _MOMENTS), (1, 2)):
         yield replace(braked, ways=2 * (_MOMENTS - 1), moment=part / _MOMENTS, power=power)
 

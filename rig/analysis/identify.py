@@ -44,7 +44,7 @@ LEAD = math.log(1000.0)
 """Least log odds of a reading against the likeliest different one; below, a drop is ambiguous."""
 _CLEAR = 0.97
 """Matched share of the matchable edges above which no other start is tried."""
-_FAIR = 0.9
+FAIR = 0.9
 """Matched share of the matchable edges above which a reading is good. With 0.95 fewer faults are
 named; with as many misses as chance allows, few edges would hide a fault of the set-up."""
 RESTLESS = 2.0
@@ -185,17 +185,17 @@ def few_edges(shares: Mapping[str, float], words: Vocabulary) -> dict[str, Reaso
     }
 
 
-def most_votes(protocol: Protocol, record: ChainRecord, clock_u: float) -> int:
-    """Return how many of a side's edges agree on a fall near the stated values, at most."""
+def side_fall(protocol: Protocol, record: ChainRecord, clock_u: float) -> SideFall:
+    """Return a side whose edges are to be counted that agree on a fall near the stated values."""
     pairing = Pairing.of(record.trains, record.top_shadow)
-    return SideFall.of(protocol, record, pairing, clock_u).most_votes()
+    return SideFall.of(protocol, record, pairing, clock_u)
 
 
 def well_read(fit: Fit) -> bool:
     """Whether nearly all matchable edges are matched, with usual scatter and unknowns in range."""
     records = fit.model.records.values()
     expected = sum(record.edge_count for record in records)
-    many = fit.match_count >= max(LEAST * max(1, expected), _FAIR * sum(map(possible, records)))
+    many = fit.match_count >= max(LEAST * max(1, expected), FAIR * sum(map(possible, records)))
     strain = float(np.abs(fit.model.unknowns.pull(fit.x)).max())
     return many and fit.estimate.scatter < RESTLESS and strain < STRAY
 

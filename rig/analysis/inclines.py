@@ -12,13 +12,12 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 from rig.analysis.fit import Fit
-from rig.analysis.identify import LEAD
+from rig.analysis.identify import LEAD, RESTLESS
 from rig.errors import DomainError
 from rig.model.predict import expected_alpha
 from rig.protocol.protocol import Run
 from rig.reasons import Reason, make_reason
 
-_FITS = 2.0  # standard uncertainties within which α matches another incline
 _MODEL = 0.15
 """Relative standard uncertainty of the model's α: resolved rods give up to 40 % more."""
 
@@ -30,14 +29,14 @@ def other_incline(fit: Fit, run: Run) -> Iterator[Reason]:
         return
     alpha = float(fit.x[model.unknowns["alpha"]][0])
     u = float(fit.estimate.own_u[model.unknowns["alpha"]][0])
-    likely: dict[float, tuple[float, float]] = {}  # ln p of α, and its deviation in units of sd
+    fits: dict[float, tuple[float, float]] = {}  # ln p of α, and its deviation in units of sd
     for angle in (stated, *model.protocol.plan.inclines):
         with suppress(DomainError):
             expected = expected_alpha(model.records["impact"].chain.chain, surface, angle)
             sd = math.hypot(u, expected.u, _MODEL * expected.value)
             far = abs(alpha - expected.value) / sd
-            likely[angle] = -0.5 * far**2 - math.log(sd), far
-    best = max(likely, key=lambda angle: likely[angle], default=stated)
-    if stated in likely and likely[best][1] < _FITS and likely[best][0] > likely[stated][0] + LEAD:
+            fits[angle] = -0.5 * far**2 - math.log(sd), far
+    best = max(fits, key=lambda angle: fits[angle], default=stated)
+    if stated in fits and fits[best][1] < RESTLESS and fits[best][0] > fits[stated][0] + LEAD:
         values = {"alpha": alpha, "U95": 2.0 * u, "likelier_deg": best, "stated_deg": stated}
         yield make_reason("other_incline", model.protocol.vocabulary, **values)

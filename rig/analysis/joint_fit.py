@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.analysis.adjust import length
+from rig.analysis.adjust import STEPS, length
 from rig.analysis.components import Components, priors
 from rig.analysis.equations import STRAY, Residuals, standardise
 from rig.analysis.evidence import Evidence
@@ -42,7 +42,6 @@ FEWEST = 4
 """Least number of drops for a joint fit: a block of A, B, B, A."""
 IDENTIFIED = 0.5
 """Least relative reduction of the prior variance for an unknown to count as identified."""
-_ROUNDS = 60  # few drops need many rounds, as they determine the scatter poorly
 _FIRST = 2  # rounds until shared and own unknowns fit together
 _DONE = 0.02
 """Last step in standard uncertainties, root mean square over independent sums of shared unknowns,
@@ -179,7 +178,7 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
     settled, size, before = False, len(shared), evidence.components
     previous = np.zeros(size + len(before.__slots__))
     damping, inverse = np.ones_like(previous), np.eye(size)
-    for round_ in range(_ROUNDS):
+    for round_ in range(STEPS):  # few drops need many, as they determine the scatter poorly
         groups = with_priors([group.at(x) for group in groups], evidence.components)
         # In the first round shared and own unknowns do not fit together yet: cut no residuals.
         sd, root, groups = joint_step(groups, x, STRAY if round_ else math.inf)

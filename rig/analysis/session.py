@@ -14,6 +14,7 @@ from rig.analysis.budgets import Budgets
 from rig.analysis.drop import DropCase, DropSummary
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.fit import DropFit, Fit, alone
+from rig.analysis.identify import FAIR
 from rig.analysis.joint_fit import FEWEST, JointFit, RigEstimate, joint_fit
 from rig.analysis.joint_step import JointDrop
 from rig.analysis.pairs import Effects, effects
@@ -37,9 +38,6 @@ Causes = Mapping[tuple[int, int], Sequence[Reason]]
 Key = tuple[int, Job]
 """A session's place, and a drop of it."""
 _EXPLAINED = 6  # void drops of a session for which set-up faults are searched
-KEPT = 0.9
-"""Least share of its matched edges that a drop must keep in the joint fit: with fewer, its result
-rests on priors."""
 
 
 class SummaryByDrop(Interface):
@@ -317,7 +315,7 @@ def _fit_jointly(
         fewer = {
             key: drop.match_count
             for (key, fit), drop in zip(fits.items(), joint.drops, strict=joint.settled)
-            if drop.match_count < KEPT * fit.match_count
+            if drop.match_count < FAIR * fit.match_count  # else its result rests on priors
         }
         # If most drops are left out, the fit has failed, not the drops.
         if not joint.settled or 2 * (drops - len(fits) + len(fewer)) > drops:

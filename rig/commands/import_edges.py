@@ -10,7 +10,7 @@ from pathlib import Path
 from rig.analysis.chain_records import chain_records
 from rig.analysis.drop import DropCase
 from rig.analysis.gravity import check_gravity
-from rig.analysis.identify import log_evidence, most_votes
+from rig.analysis.identify import log_evidence, side_fall
 from rig.analysis.result import DropResult
 from rig.clock.calibration import TimeScale
 from rig.clock.epochs import RESONATOR_TOLERANCE
@@ -22,6 +22,7 @@ from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
 from rig.reasons import make_reason, reasons_json
 from rig.records import Drop
+from rig.report.numbers import plus_minus
 from rig.report.templates import lines
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -83,7 +84,7 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
     planned = {run.number: run for run in runs(protocol)}
     # Of gates that the file does not have nothing is due.
     protocol = with_channels(protocol, {*reading.channel.tolist()})
-    near, expected, evidence, gravity = 0, 0, 0.0, list[float]()
+    near, expected, evidence = 0, 0, 0.0
     shares, results = [(1.0, 0)], list[DropResult]()
     rate = TimeScale(TICK_HZ, RESONATOR_TOLERANCE)
     most = None if exact else _COMPARED
@@ -93,7 +94,7 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
     for n in sorted({*order[:: 1 + len(order) // _MOST], *order[-1:]}):
         run, drop = planned[reading.runs[n]], reading.drop(n)
         records = chain_records(protocol.of(run), run, drop, TICK_HZ)
-        votes = sum(most_votes(protocol.of(run), record, rate.u) for record in records)
+        votes = sum(side_fall(protocol.of(run), x, rate.u).most_matches() for x in records)
         due = sum(record.edge_count for record in records)
         # A single edge is near one of some fall, whenever that began.
         shares.append((votes / max(2, len(drop.edges), due), n))
@@ -101,14 +102,13 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
         if exact and len(results) < _COMPARED:
             result, fit = DropCase(protocol, run, drop, rate).read(explain=False)
             evidence += log_evidence(fit) if fit else 0.0
-            gravity += [each.value for name, each in result.quantities.items() if "gravity" in name]
             results.append(result)
     sums = {"compared": len(shares) - 1, "runs": len(compared), "near": near, "due": expected}
     text = make_reason("falls_fit", **sums).text
-    if gravity:
-        text += f"; g {sum(gravity) / len(gravity):.2f} m/s²"
     check = check_gravity(protocol, results)
-    return FallMatch(*min(shares), evidence, text, check.doubts if check else ())
+    text += f"; g {plus_minus(check.measured)} m/s²" if check else ""
+    doubts = check.doubts if check else [x for result in results[:1] for x in result.reasons]
+    return FallMatch(*min(shares), evidence, text, doubts)
 
 
 def _check_plan(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:

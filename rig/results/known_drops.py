@@ -40,12 +40,9 @@ class KnownDrops:
         self._entry(drop).write(summary)
 
     def _entry(self, drop: Drop) -> CacheEntry[DropSummary]:
-        return CacheEntry(DropSummary, self._content, digest_of(drop), fresh=self._fresh)
-
-
-def digest_of(drop: Drop) -> str:
-    """Return the SHA-256 of a drop's whole record."""
-    return sha256(f"{edges_digest(drop)} {replace(drop, edges=())}".encode()).hexdigest()
+        whole = f"{edges_digest(drop)} {replace(drop, edges=())}".encode()
+        digest = sha256(whole).hexdigest()
+        return CacheEntry(DropSummary, self._content, digest, fresh=self._fresh)
 
 
 def edges_digest(drop: Drop) -> str:

@@ -122,31 +122,26 @@ def columns_of(
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
     facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
     held = Counter(itertools.chain(*facts.values()))
-    alike = {fact for fact in ("all.state", "climbs") if held[fact] > 1}
-    for n, texts in cells.items():
-        # Where others are alike, a broken cell does not make another kind of column.
-        values = [*filter(vocabulary.kinds_of, texts)]
-        if 2 * len(values) > len(texts) and alike & (like := _facts_of_values(values)):
-            facts[n] = like
     heading = block.find_heading(width, facts)
     numbers = [n for n, text in enumerate(rows[0].texts) if is_measured(text)]
-    below = [row for row in block.headings if heading and row.line > heading.line]
-    for row in below if heading else block.headings[-1:]:
-        # What has half of a row's numbers is no heading, but a row of which nothing can be read.
+    for row in block.headings:
+        # What has most of a row's numbers is no heading, but a row of which nothing can be read.
         count = sum(is_measured(row.cell(n)) for n in numbers)
-        if vocabulary.kinds_of(row.cell(0)) and 2 * count >= len(numbers) > 0:
+        count += bool(vocabulary.kinds_of(row.cell(0)))
+        is_below = row.line > (heading.line if heading else 0)
+        is_setting = any(row.cell(n) for n in range(min(numbers, default=0)) if n not in facts)
+        if is_below and not is_setting and 2 * count > len(numbers) > 0:
             file.unread.append(row.line)
             file.rows += 1
     is_counted = facts.keys() >= {0, width - 1} and "counts" in facts[0]
     if heading and is_counted and len(heading.texts) < width:
         heading = heading._replace(texts=["", *heading.texts])  # numbers of rows have no name
+    file.facts |= {"beam"} & {fact.removeprefix("any.") for fact in held}
     shared = {f"table.{fact}" for fact in held} | _held({"rated": block.find_time_base()[1]})
     shared |= {f"columns.{min(len(facts), _MANY)}", f"states.{min(held['all.state'], _MANY)}"}
     columns = [_read_column(block, heading, n, facts[n] | shared, cells[n]) for n in facts]
     for column in columns:
         column.filled = len(cells[column.at]) / len(rows)
-        is_said = column.role in {"state", "cleared"} and "any.beam" in facts[column.at]
-        file.facts |= {"beam"} if is_said else set()
     if heading is None:
         if any(row.count_known() > 1 and len(row.texts) > width for row in block.headings):
             file.problems.refuse(block.headings[0].line, "heading_unfit", columns=width)
@@ -234,6 +229,8 @@ def _read_column(
 
 def _facts_of_values(texts: Sequence[str]) -> set[str]:
     """Return what holds of the values of a column, of which some may be missing."""
+    known = [*filter(vocabulary.kinds_of, texts)]
+    texts = known if 2 * len(known) > len(texts) else texts  # a broken cell makes no other kind
     kinds = list(map(vocabulary.kinds_of, texts))
     facts = {f"all.{kind}" for kind in frozenset.intersection(*kinds)}
     facts |= {f"any.{kind}" for kind in frozenset().union(*kinds)}
@@ -269,12 +266,12 @@ def pair_columns(columns: Sequence[TimerColumn]) -> Iterator[Signal]:
     chosen = next((v for v in VALUES if any(c.role in v for c in columns)), ())
     is_sampled = chosen == SAMPLED
     clocks = {c: _clock_of(c, times) for c in columns if c.role in chosen}
-    parts = set(map(_part_of, clocks.values()))
     for clock in times:
         values = [column for column in clocks if clocks[column] is clock]
-        # Without values it is another clock of the same, or tells of changes by itself.
-        if not (values or is_sampled or _part_of(clock) in parts):
-            values = [replace(clock, at=ROW_COUNT.at, role="moment")]
+        # Without values it tells of changes by itself, or another run had the same.
+        if not (values or is_sampled):
+            shared = [x for x in clocks if _part_of(clocks[x]) == _part_of(clock)]
+            values = shared or [replace(clock, at=ROW_COUNT.at, role="moment")]
         labels = Counter(map(_label_of, values))
         for n, value in enumerate(values, 1):
             is_beside = is_sampled or len(values) > 1

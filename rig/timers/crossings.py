@@ -50,5 +50,6 @@ def find_crossings(samples: Array) -> tuple[float | None, Array]:
     crossings = np.flatnonzero(np.diff(is_high)) + 1
     at = crossings[np.searchsorted(crossings, turns, side="right") - 1]
     share = (volts[at] - middle) / (volts[at] - volts[at - 1])
+    share *= 2 * at.size <= volts.size  # rows of changes alone do not say what was between
     moments = times[at] - share * (times[at] - times[at - 1])
     return middle, np.stack([lines[at], moments, is_high[at]], axis=1)

@@ -152,9 +152,8 @@ def _find_readings(options: Namespace, gates: Sequence[int], bars: int) -> list[
         raise refusal(options.events, "inputs_unclear", **values, pairs=pairs)
     shortest = min(readings, key=lambda reading: max(reading.lasting))
     if max(shortest.lasting) > LONGEST_DROP:
-        limit = {"lasting_s": max(shortest.lasting) / TICK_HZ, "limit_s": LONGEST_DROP / TICK_HZ}
         place = f"{options.events}:{shortest.line[shortest.tick.argmax()]}:1"
-        raise refusal(place, "too_long", recording="a drop", **limit)
+        raise refusal(place, "too_long", lasting_s=max(shortest.lasting) / TICK_HZ)
     return [reading for reading in readings if max(reading.lasting) <= LONGEST_DROP]
 
 
@@ -172,7 +171,7 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
     rough = sorted(((fit(x, False), x) for x in distinct), key=lambda row: -row[0].share)
     likely = [x for match, x in rough if match.share >= x.least_share]
     exact = [(fit(x, True), x) for x in likely[:_FINALISTS]]
-    ranked = [row for row in exact if row[0].share >= row[1].least_share]
+    ranked = [row for row in exact if row[0].evidence and row[0].share >= row[1].least_share]
     ranked.sort(key=lambda row: _DECISIVE * row[1].oddities - row[0].evidence)
     if not ranked:
         match, best = (exact or rough)[0]

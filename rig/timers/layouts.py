@@ -65,11 +65,6 @@ class FileLayout(NamedTuple):
     channels: Mapping[str, int] = MappingProxyType({})
 
     @property
-    def contradictions(self) -> int:
-        """Count what is contrary to what the file says, or to how files usually are."""
-        return (self.dark == "inverted") + (self.first == "change") + (self.groups == "unsorted")
-
-    @property
     def text(self) -> str:
         """What ``--map`` accepts."""
         settings = zip(SETTINGS, self, FileLayout(), strict=False)
@@ -167,8 +162,8 @@ class FileReading:
 
     @property
     def oddities(self) -> int:
-        """Count what is not as usual."""
-        return self.layout.contradictions + (not self.is_whole)
+        """Count what is contrary to what the file says, or to how files and beams usually are."""
+        return len({"inverted", "unsorted", "change"} & {*self.layout[1:4]}) + (not self.is_whole)
 
     @property
     def is_whole(self) -> bool:
@@ -239,9 +234,8 @@ def find_layouts(file: TimerFile, gates: Sequence[int], bars: int) -> Iterator[F
     changes, drop = group_changes(file, "", "runs", 0.0)
     most = 1 + count_before(drop * len(file.names) + changes["label"]).max(initial=0)
     is_signal = np.any(state > STATES.index("blocked"))
-    levels = (
-        ["high", "low"] if is_signal else ["states", *["inverted"] * ("beam" not in file.facts)]
-    )
+    states = ["states"] if "beam" in file.facts else ["states", "inverted"]
+    levels = ["high", "low"] if is_signal else states
     # More times than bars: it darkens and clears in turns.
     times = ["turns", "turns-clear", "each"] if most > bars else ["each", "turns", "turns-clear"]
     choices: dict[str, Sequence[Any]] = {"unit": list(POWERS)} if None in file.powers else {}

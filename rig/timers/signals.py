@@ -128,21 +128,19 @@ class SignalReader:
         self.starts, self.states = dict[int, int](), dict[tuple[int, ...], int]()
         self.changes, self.samples = list[Any](), [array("d") for _ in self.signals]
         words: list[str] | None = None
+        signals = [*enumerate(self.signals)]
         for row in rows:
             ticks = {clock.at: self._read_time(row, clock) for clock in self.clocks}
             before, words = words, [row.cell(at) for at in self.levels] + row.texts[self.width :]
             if not self.levels or words != before or None in ticks.values():
-                said = [self._read_value(n, row, ticks) for n in range(len(self.signals))]
-                is_read = any(said) and not any(row.texts[self.width :])
+                said = {x.clock.at for n, x in signals if self._read_value(n, row, ticks)}
+                silent = {at for at, tick in ticks.items() if tick is not None} - said
+                is_read = said and not silent and not any(row.texts[self.width :])
                 file.unread += [] if is_read else [row.line]
             self.count += 1
             if len(self.changes) > MAX_EVENTS:
                 file.problems.refuse(row.line, "too_many_events", limit=MAX_EVENTS)
         file.rows += self.count
-        if self.unused and not self.places and self.signals[0].value.role == "moment":
-            steps = [b[1] - a[1] for a, b in itertools.pairwise(self.changes)]
-            if len(steps) > 3 and max(steps) < 1.5 * min(steps):
-                file.problems.refuse(self.changes[0][0], "regular_samples", columns=self.unused)
         for n, signal in enumerate(self.signals):
             if signal.value.role == "volts":
                 self._find_crossings(n, row)

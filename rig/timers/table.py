@@ -213,6 +213,8 @@ class Table:
         """Split a line into cells; numbers get a decimal point, and what is missing is empty."""
         if not self.separator:
             values = dict(_named_values(line))
+            if values.keys().isdisjoint(self._names):  # of a line that begins in its middle
+                values = {(name.split(" ")[-1], n): text for (name, n), text in values.items()}
             # Names that come again are of another row, which may not be lost.
             again = [x for x in values.keys() - self._names if (x[0], 0) in self._names]
             return [values.get(x, "") for x in (*self._names, *again)] if values else [line]
@@ -295,6 +297,9 @@ def _unwrap(line: str) -> list[str]:
     """Return a line without the brackets around it; lists in a line are lines of their own."""
     line = form("exponent of Fortran").sub("E", line) if "D" in line else line
     line = form("remark behind").sub("", line) if "#" in line or "//" in line else line
+    if (clock := form("clock before").match(line)) is not None:  # the monitor's, not the program's
+        rest = line[clock.end() :]
+        line = f"{clock[1]}{next(filter(rest.__contains__, ',;	'), ' ')}{rest}"
     if line[:1].isdigit() or not form("list").match(line):
         return [line]
     pieces = form("between lists").split(line)
@@ -331,10 +336,15 @@ def find_separator(lines: Sequence[str], named: int) -> str:
     """
     rows = [line[:1000].strip() for line in lines if re.search("[0-9]", line[:1000])][-_JUDGED:]
     is_named = any(re.search("[A-Za-z][A-Za-z0-9]", line) and "," in line for line in lines[:200])
-    has_comma = form("decimal comma").fullmatch
-    numbers = [row.replace(",", ".") for row in rows if has_comma(row)]
-    if 2 * len(numbers) > len(rows) and not is_named and sorted(numbers, key=float) == numbers:
-        return ";"  # times go on with decimal commas; 0,25 below 1,5 is no decimal comma
+    pairs = [row.split(",") for row in rows if form("decimal comma").fullmatch(row)]
+    numbers = [float(".".join(pair)) for pair in pairs]
+    if 2 * len(pairs) > len(rows) and not is_named and sorted(numbers) == numbers:
+        # Times go on with decimal commas; but few numbers that return are states, or gates, and
+        # numbers that all rise are times themselves.
+        behind, parts = {pair[1] for pair in pairs}, [part for pair in pairs for part in pair]
+        is_time = all(map(str.isdigit, parts)) and sorted(map(int, parts)) == [*map(int, parts)]
+        if not is_time and len(behind) > min(2 + len(pairs) // 4, len(pairs) // 2):
+            return ";"
     counts = {"": (named, 0)} if named else {}
     marks = [mark for mark in "\t;|" if 2 * sum(mark in row for row in rows) > len(rows)]
     for mark in marks or ", ":

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rig.analysis.result import Measured
 from rig.measurands import SEPARATION, averaged
 from rig.predictions import predicted_run
 from rig.printable import one_line
@@ -61,7 +61,7 @@ def sentence(view: SessionView, job: Job) -> str:
     measured = result.quantities[row.name]
     expected = predicted_run(view.protocol, run).get(row.name)
     beside = "" if expected is None else f"; model {plus_minus(expected, row.scale)}"
-    size = plus_minus(Measured(abs(measured.value), measured.u), row.scale)
+    size = plus_minus(replace(measured, value=abs(measured.value)), row.scale)
     if row == SEPARATION and run.impact is not None:
         wins = "wins" if measured.value > 0.0 else "loses"
         return f"{one_line(run.impact, 20)} {wins} by {size} {row.unit}{beside}"
