@@ -76,7 +76,7 @@ def derive_bundle(data: bytes) -> DerivedBundle:
 def describe_history(session: Reader, examined: ExaminedFile, analysis: Analysis) -> list[str]:
     """List what was fixed beforehand, deviations from the plan, unblinding and attached files."""
     protocol = protocol_of(session)
-    imported = next(session.byte_log(), None) is None
+    imported = any("file" in about for _, about in session.identities())
     links = examined.rows.in_order("hash")
     broken = any("table protocol" in line or "table hash" in line for line in examined.damage)
     first = False if broken else protocol_first(links)

@@ -32,19 +32,18 @@ def open_for(protocol: Protocol, source: Path, url: str, path: Path) -> Session:
         session = undo.enter_context(Session.open(path))
         if session.protocol_text != protocol.text:
             raise rig_error("other_protocol", path=str(path), source=session.protocol_source)
-        if any("file" in about for _, about in session.identities()):
-            raise rig_error("session_imported", path=str(path))
         if session.simulated != simulated:
             recorded, kind = ("real", "a simulation") if simulated else ("simulated", "a real port")
-            raise rig_error("session_mixed", path=str(path), recorded=recorded, port=url, kind=kind)
+            values = {"path": str(path), "recorded": recorded, "port": url, "kind": kind}
+            raise rig_error("session_mixed", **values)
         undo.pop_all()
     return session
 
 
 def latest_board(session: Reader) -> dict[str, str]:
     """Say what is known of the board and port where the session was recorded at last."""
-    boards = (board.items() for _, board in session.identities()[::-1] if "port" in board)
-    return {name: str(value) for name, value in next(boards, ())}
+    boards = [identity for _, identity in session.identities() if "port" in identity]
+    return {name: str(value) for name, value in boards[-1].items()} if boards else {}
 
 
 def describe_session(
