@@ -51,7 +51,7 @@ _RECORD = 4.0
 _NODES = 400
 _BATCH = 8  # grid points of the first batch
 PEAKS = 5
-"""Starts of a batch that are annealed, and faults that are fitted of each kind of search."""
+"""Starts of a batch that are annealed."""
 _ALIKE = 0.75
 """Share of equally assigned edges above which two starts converge to the same fall."""
 LEAST = 0.6
@@ -501,8 +501,8 @@ class SideFall:
         """Return how many edges agree, each with a side of its own, with the fall of most votes."""
         falls, votes = self._count_votes(self.nodes()[:_BATCH])
         fall, (edge, side) = falls[np.argsort(-votes)[:1]], self.pairing.pairs
-        heights, _ = self.path(fall).heights(self.since(fall, self.pairing.times))
-        _, near = np.nonzero(np.abs(heights[:, edge] - self.levels[side]) <= self.slack)
+        heights = self.path(fall).heights(self.since(fall, self.pairing.times))[0]
+        near = (np.abs(heights[:, edge] - self.levels[side]) <= self.slack).any(axis=0)
         return min(np.unique(edge[near]).size, np.unique(side[near]).size)
 
     def _count_votes(self, nodes: Array, earliest: float = -np.inf) -> tuple[Array, Index]:

@@ -238,8 +238,7 @@ def edge_train(
         Height above the contact point at which each rod stops, m: no passage is expected below;
         `None` for a free chain.
     """
-    channel = gate.channel
-    at_gate = slice(*np.searchsorted(edges.channels, [channel, channel + 1]).tolist())
+    at_gate = slice(*np.searchsorted(edges.channels, [gate.channel, gate.channel + 1]).tolist())
     # Some timers record only edges that darken a beam.
     darkening = bool(edges.blocked.size and edges.blocked.all())
     return EdgeTrain(
@@ -249,7 +248,7 @@ def edge_train(
         edges.burst[at_gate],
         edges.numbers[at_gate],
         *_passages(gate.height, chain, start, higher, darkening),
-        int(edges.received[channel : channel + 1].sum()) - edges.times[at_gate].size,
+        int(edges.received[gate.channel : gate.channel + 1].sum()) - edges.times[at_gate].size,
     )
 
 

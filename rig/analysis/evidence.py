@@ -17,7 +17,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from rig.analysis.adjust import DONE
 from rig.analysis.components import LEAST_SHARE, Components, above
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY, Residuals
@@ -33,6 +32,7 @@ _DOUBTED = 2.0
 """Least share of every other component, in units of the estimated share of the stated departures;
 half or three halves of this factor change no coverage by more than a percentage point."""
 _INNER = 40  # steps; the next round of the joint fit continues
+_SETTLED = 1e-3  # relative change of variances at convergence
 _BINS = 64
 
 
@@ -195,7 +195,7 @@ class Evidence:
             degrees = counts * share + beforehand
             grown = kinds @ (estimates / total**2) / np.maximum(kinds @ (degrees / total), tiny)
             before, variances = variances, np.maximum(variances * grown, LEAST_SHARE**2 * stated)
-            if (np.abs(variances - before) <= DONE * before).all():
+            if (np.abs(variances - before) <= _SETTLED * before).all():
                 break
         for name, sizes, variance in zip(names, kinds, variances.tolist(), strict=True):
             new[name] = variance**0.5

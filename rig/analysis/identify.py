@@ -187,8 +187,7 @@ def few_edges(shares: Mapping[str, float], words: Vocabulary) -> dict[str, Reaso
 
 def side_fall(protocol: Protocol, record: ChainRecord, clock_u: float) -> SideFall:
     """Return a side whose edges are to be counted that agree on a fall near the stated values."""
-    pairing = Pairing.of(record.trains, record.top_shadow)
-    return SideFall.of(protocol, record, pairing, clock_u)
+    return SideFall.of(protocol, record, Pairing.of(record.trains, record.top_shadow), clock_u)
 
 
 def well_read(fit: Fit) -> bool:

@@ -94,11 +94,11 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
     for n in sorted({*order[:: 1 + len(order) // _MOST], *order[-1:]}):
         run, drop = planned[reading.runs[n]], reading.drop(n)
         records = chain_records(protocol.of(run), run, drop, TICK_HZ)
-        votes = sum(side_fall(protocol.of(run), x, rate.u).most_matches() for x in records)
+        matched = sum(side_fall(protocol.of(run), x, rate.u).most_matches() for x in records)
         due = sum(record.edge_count for record in records)
         # A single edge is near one of some fall, whenever that began.
-        shares.append((votes / max(2, len(drop.edges), due), n))
-        near, expected = near + votes, expected + due
+        shares.append((matched / max(2, len(drop.edges), due), n))
+        near, expected = near + matched, expected + due
         if exact and len(results) < _COMPARED:
             result, fit = DropCase(protocol, run, drop, rate).read(explain=False)
             evidence += log_evidence(fit) if fit else 0.0

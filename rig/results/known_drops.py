@@ -40,8 +40,7 @@ class KnownDrops:
         self._entry(drop).write(summary)
 
     def _entry(self, drop: Drop) -> CacheEntry[DropSummary]:
-        whole = f"{edges_digest(drop)} {replace(drop, edges=())}".encode()
-        digest = sha256(whole).hexdigest()
+        digest = sha256(f"{edges_digest(drop)} {replace(drop, edges=())}".encode()).hexdigest()
         return CacheEntry(DropSummary, self._content, digest, fresh=self._fresh)
 
 

@@ -268,7 +268,7 @@ def pair_columns(columns: Sequence[TimerColumn]) -> Iterator[Signal]:
     clocks = {c: _clock_of(c, times) for c in columns if c.role in chosen}
     for clock in times:
         values = [column for column in clocks if clocks[column] is clock]
-        # Without values it tells of changes by itself, or another run had the same.
+        # Without values it shares those of another run, or tells of changes by itself.
         if not (values or is_sampled):
             shared = [x for x in clocks if _part_of(clocks[x]) == _part_of(clock)]
             values = shared or [replace(clock, at=ROW_COUNT.at, role="moment")]

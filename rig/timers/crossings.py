@@ -49,7 +49,7 @@ def find_crossings(samples: Array) -> tuple[float | None, Array]:
     turns = sure[1:][np.diff(is_high[sure])]
     crossings = np.flatnonzero(np.diff(is_high)) + 1
     at = crossings[np.searchsorted(crossings, turns, side="right") - 1]
-    share = (volts[at] - middle) / (volts[at] - volts[at - 1])
-    share *= 2 * at.size <= volts.size  # rows of changes alone do not say what was between
+    # Rows of changes alone do not say what was between.
+    share = (volts[at] - middle) / (volts[at] - volts[at - 1]) * (2 * at.size <= volts.size)
     moments = times[at] - share * (times[at] - times[at - 1])
     return middle, np.stack([lines[at], moments, is_high[at]], axis=1)

@@ -153,7 +153,8 @@ def _find_readings(options: Namespace, gates: Sequence[int], bars: int) -> list[
     shortest = min(readings, key=lambda reading: max(reading.lasting))
     if max(shortest.lasting) > LONGEST_DROP:
         place = f"{options.events}:{shortest.line[shortest.tick.argmax()]}:1"
-        raise refusal(place, "too_long", lasting_s=max(shortest.lasting) / TICK_HZ)
+        limit = {"lasting_s": max(shortest.lasting) / TICK_HZ, "limit_s": LONGEST_DROP / TICK_HZ}
+        raise refusal(place, "too_long", **limit)
     return [reading for reading in readings if max(reading.lasting) <= LONGEST_DROP]
 
 
@@ -161,8 +162,8 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
     """Return the reading that a fall of the protocol bears out, and how well.
 
     Where the user said which input is which gate, that reading, if there is no other, is taken
-    whatever falls say. What contradicts the file is taken only where nothing else fits nearly as
-    well.
+    whatever falls say. Of others a drop has to be identified, which is the evidence. What
+    contradicts the file is taken only where nothing else fits nearly as well.
     """
     distinct = [*{x.key: x for x in reversed(readings)}.values()][::-1]
     usual = [reading for reading in distinct if reading.is_whole] or distinct

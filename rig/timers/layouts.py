@@ -163,6 +163,7 @@ class FileReading:
     @property
     def oddities(self) -> int:
         """Count what is contrary to what the file says, or to how files and beams usually are."""
+        # Of the layout: which level is dark, groups, and the first row.
         return len({"inverted", "unsorted", "change"} & {*self.layout[1:4]}) + (not self.is_whole)
 
     @property

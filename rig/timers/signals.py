@@ -134,8 +134,8 @@ class SignalReader:
             before, words = words, [row.cell(at) for at in self.levels] + row.texts[self.width :]
             if not self.levels or words != before or None in ticks.values():
                 said = {x.clock.at for n, x in signals if self._read_value(n, row, ticks)}
-                silent = {at for at, tick in ticks.items() if tick is not None} - said
-                is_read = said and not silent and not any(row.texts[self.width :])
+                timed = {at for at, tick in ticks.items() if tick is not None}
+                is_read = said and said == timed and not any(row.texts[self.width :])
                 file.unread += [] if is_read else [row.line]
             self.count += 1
             if len(self.changes) > MAX_EVENTS:

@@ -297,9 +297,9 @@ def _unwrap(line: str) -> list[str]:
     """Return a line without the brackets around it; lists in a line are lines of their own."""
     line = form("exponent of Fortran").sub("E", line) if "D" in line else line
     line = form("remark behind").sub("", line) if "#" in line or "//" in line else line
-    if (clock := form("clock before").match(line)) is not None:  # the monitor's, not the program's
+    if clock := form("clock before").match(line):  # the monitor's, not the program's
         rest = line[clock.end() :]
-        line = f"{clock[1]}{next(filter(rest.__contains__, ',;	'), ' ')}{rest}"
+        line = clock[1] + next(filter(rest.__contains__, ",;\t"), " ") + rest
     if line[:1].isdigit() or not form("list").match(line):
         return [line]
     pieces = form("between lists").split(line)
@@ -342,7 +342,7 @@ def find_separator(lines: Sequence[str], named: int) -> str:
         # Times go on with decimal commas; but few numbers that return are states, or gates, and
         # numbers that all rise are times themselves.
         behind, parts = {pair[1] for pair in pairs}, [part for pair in pairs for part in pair]
-        is_time = all(map(str.isdigit, parts)) and sorted(map(int, parts)) == [*map(int, parts)]
+        is_time = all(map(str.isdigit, parts)) and sorted(parts, key=int) == parts
         if not is_time and len(behind) > min(2 + len(pairs) // 4, len(pairs) // 2):
             return ";"
     counts = {"": (named, 0)} if named else {}

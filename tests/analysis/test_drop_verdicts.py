@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from bench.studies.layout_catalogue import KINDS, under
 from rig.analysis.result import DropResult
 from rig.analysis.session import analyze
-from rig.analysis.verdict import HUBER, _air
+from rig.analysis.verdict import _SURE, _air
 from rig.errors import InputError
 from rig.protocol.protocol import Accept, Gates
 from rig.protocol.reader import parse
@@ -266,7 +266,7 @@ def test_air_that_pushes_is_told_of_beyond_its_own_uncertainty(share, pushed):
     u = 0.5 * 4.0  # of the unknown in its own units, and one of these
     fit = SimpleNamespace(
         model=SimpleNamespace(
-            protocol=UNIFORM, unknowns={"drag": slice(0, 1)}, kappa=lambda _x: -share * HUBER * u
+            protocol=UNIFORM, unknowns={"drag": slice(0, 1)}, kappa=lambda _x: -share * _SURE * u
         ),
         estimate=SimpleNamespace(x=[0.0], inverse=np.array([[0.5]]), sd=[4.0], scatter=1.0),
     )
