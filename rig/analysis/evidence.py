@@ -120,7 +120,7 @@ class Evidence:
             good &= row.sigma**2 <= 2.0 * usual
             self._edges.append((row.values[good] ** 2, row.speed[good] ** 2, row.loose[good]))
 
-    def estimate_components(self, parameters: float, struck: float = 0.0) -> Evidence:
+    def estimate_components(self, parameters: float, struck: float) -> None:
         """Estimate the components.
 
         Parameters
@@ -145,7 +145,6 @@ class Evidence:
             new[name] = max(new[name], least * getattr(self.stated, name))
         new["few"] = parted * self.stated.few
         self.components = replace(self.components, landed=least, **new)
-        return self
 
     def _bin_squares(self, parameters: float, struck: float) -> Array:
         """Bin edges of equal variance: similar speed, same number of falling rods.

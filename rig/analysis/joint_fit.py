@@ -42,7 +42,7 @@ FEWEST = 4
 """Least number of drops for a joint fit: a block of A, B, B, A."""
 IDENTIFIED = 0.5
 """Least relative reduction of the prior variance for an unknown to count as identified."""
-_FIRST = 2  # rounds until shared and own unknowns fit together
+_FIRST = 2  # rounds until shared and own unknowns fit together, and until both rest
 _DONE = 0.02
 """Last step in standard uncertainties, root mean square over independent sums of shared unknowns,
 and last relative change of the components."""
@@ -175,7 +175,7 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
     shared, groups = group_drops(fits)
     x, beforehand = np.zeros(len(shared)), priors(fits[0].model.protocol)
     evidence = Evidence(beforehand, beforehand)
-    settled, size, before = False, len(shared), evidence.components
+    settled, rests, size, before = False, 0, len(shared), evidence.components
     previous = np.zeros(size + len(before.__slots__))
     damping, inverse = np.ones_like(previous), np.eye(size)
     for round_ in range(STEPS):  # few drops need many, as they determine the scatter poorly
@@ -183,7 +183,9 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
         # In the first round shared and own unknowns do not fit together yet: cut no residuals.
         sd, root, groups = joint_step(groups, x, STRAY if round_ else math.inf)
         step = damping[:size] * root.step()
-        moves = _move(groups, x, sd, step) if np.isfinite(step).all() else None
+        # Once shared unknowns rest, halve steps: a drop's own may alternate about an impact.
+        share = 0.5 ** max(0, rests - _FIRST)
+        moves = _move(groups, x, sd, step, share) if np.isfinite(step).all() else None
         if moves is None:
             settled, groups = False, []
             break
@@ -195,6 +197,7 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
         evidence.edges(residuals)
         _weigh(evidence, shared, x, sd, inverse, groups)
         settled = moved < _DONE
+        rests = rests + 1 if settled else 0
         if settled and _steady(before, evidence.components, groups):
             break
         # Halve steps that alternate, as they do next to a lower bound of a component.
@@ -214,9 +217,9 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
 
 
 def _move(
-    groups: Sequence[DropGroup], x: Array, sd: Array, step: Array
+    groups: Sequence[DropGroup], x: Array, sd: Array, step: Array, share: float
 ) -> tuple[Array, list[DropGroup], list[Residuals]] | None:
-    """Take a step, shortened until all residuals are finite.
+    """Take a share of a step, shortened until all residuals are finite.
 
     Returns
     -------
@@ -224,7 +227,6 @@ def _move(
         The shared unknowns, the drops, and the residuals of all edges; `None` if no part of the
         step gives finite residuals.
     """
-    share = 1.0
     while share > _SHORTEST:
         common = x + share * step * sd
         moved = [group.move(common, step, share) for group in groups]
