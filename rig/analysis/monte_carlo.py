@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -42,13 +43,14 @@ class TrialStats(NamedTuple):
     @classmethod
     def of(cls, values: Array) -> TrialStats:
         """Return the distribution of trials, shape ``(trials,)``."""
-        tail = 0.5 * (1.0 - PROBABILITY)
-        low, high = np.quantile(values, [tail, 1.0 - tail])
+        low, high = np.quantile(values, [0.5 * (1.0 - PROBABILITY), 0.5 * (1.0 + PROBABILITY)])
         return cls(float(values.mean()), float(values.std(ddof=1)), float(low), float(high))
 
 
 @one_thread
-def monte_carlo(fit: Fit, trials: int, seed: int) -> dict[str, TrialStats]:
+def monte_carlo(
+    fit: Fit, trials: int, seed: int, show: Callable[[int, int], None] = lambda _done, _of: None
+) -> dict[str, TrialStats]:
     """Return the distribution of each measurand from trials with drawn errors, by JSON name.
 
     Each trial shifts every edge by its scatter and every prior mean by its standard uncertainty,
@@ -62,16 +64,17 @@ def monte_carlo(fit: Fit, trials: int, seed: int) -> dict[str, TrialStats]:
         M of JCGM 101, at least 2.
     seed
         Seed of the generator; the same seed gives the same trials.
+    show
+        Called with the number of trials done and of all.
     """
-    rng = np.random.default_rng(seed)
-    at, unknowns = fit.estimate.x, fit.model.unknowns
-    sd = np.where(unknowns.flat, 0.0, unknowns.sd)  # unknowns without a prior are not drawn
+    rng, at, sd = np.random.default_rng(seed), fit.estimate.x, fit.model.unknowns.sd
     values: dict[str, list[float]] = {}  # a shifted top rod may never strike
-    for _ in range(trials):
+    for trial in range(1, trials + 1):
         shaken = _shake(fit, rng)
         fitted = adjust(shaken, fit.matches, at, centre=sd * rng.normal(size=sd.size)).x
         for name, dual in measurands(shaken, fitted).items():
             values.setdefault(name, []).append(dual.value)
+        show(trial, trials)
     return {name: TrialStats.of(np.array(drawn)) for name, drawn in values.items()}
 
 

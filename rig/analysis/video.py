@@ -57,10 +57,8 @@ def video_fall(times: Array, x: Array, y: Array, gates: Measured | None = None) 
         As in `VideoFall`.
     """
     design = np.vander(times - times.mean(), 3)  # centred, for numerical accuracy
-    basis, triangle = np.linalg.qr(design)
-    inverse = np.linalg.inv(triangle)
-    places = np.column_stack([x, y])
-    solved = inverse @ (basis.T @ places)
+    inverse, places = np.linalg.pinv(design), np.column_stack([x, y])
+    solved = inverse @ places
     residuals = places - design @ solved
     rates = 2.0 * solved[0]
     size = float(np.hypot(*rates))

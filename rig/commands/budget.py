@@ -3,12 +3,12 @@
 from functools import partial
 from typing import Any
 
-from rig.analysis import monte_carlo
 from rig.analysis.distributions import coverage_factor
+from rig.analysis.monte_carlo import agreement, monte_carlo
 from rig.analysis.result import Measured
 from rig.analysis.session import drop_case
 from rig.cache.entry import recall
-from rig.commands.output import Arguments, print_data
+from rig.commands.output import Arguments, print_data, progress
 from rig.reasons import rig_error, sentences
 from rig.report.numbers import ranges
 from rig.report.templates import sentence
@@ -49,9 +49,8 @@ def budget(
     if drop is None:
         recorded = ranges("run", (result.run.number for result in outcome.analysis.runs))
         raise rig_error("run_unrecorded", path=session.path, run=number, runs=recorded)
-    protocol = protocol_of(session)
     check_open(session)
-    single, fit = drop_case(protocol, drop, calibration(session).scale(drop)).read()
+    single, fit = drop_case(protocol_of(session), drop, calibration(session).scale(drop)).read()
     if fit is None:
         raise rig_error("run_void", run=number, text=sentences(single.reasons))
     result = next(result for result in outcome.analysis.runs if result.run.number == number)
@@ -65,10 +64,10 @@ def budget(
     if trials is None:
         return account
     quantities = {}
-    for name, sample in monte_carlo.monte_carlo(fit, trials, seed).items():
+    show = partial(progress, label="trial")
+    for name, sample in monte_carlo(fit, trials, seed, show).items():
         measured = single.quantities[name]
-        agreement = monte_carlo.agreement(measured.value, measured.u, sample, trials)
-        quantities[name] = sample._asdict() | agreement
+        quantities[name] = sample._asdict() | agreement(measured.value, measured.u, sample, trials)
     return account | {"monte_carlo": {"trials": trials, "seed": seed, "quantities": quantities}}
 
 
