@@ -16,6 +16,7 @@ from rig.model.drag import drag_fall
 from rig.model.fall import fall, kicks
 from rig.model.impact import gamma_finite, impact_on
 from rig.model.surface import Surface
+from rig.text_rows import read_rows
 from rig.units import Quantity
 
 PAPER: dict[str, float] = {
@@ -96,33 +97,13 @@ class Extreme(NamedTuple):
         )
 
 
-_SLIDES = math.degrees(math.atan(0.2))
-ALONE: dict[str, tuple[float, ...]] = {
-    "rods": (2, 3, 1000, 10_000, 1_000_000),
-    "mass decades": (-12, 12, -300, 300, -600),
-    "alpha": (0.0, 1e-15, 1e-12, 1e-6, 0.5, 0.51),
-    "incline": (0.0, 1e-9, 5.0, _SLIDES * 0.999, _SLIDES * 1.001, 89.0, 90.0 - 1e-9, 90.0),
-    "friction": (0.0, 1e-15, 0.839, 0.84, 10.0, 1e3),
-    "inertia": (1e-12, 1e-3, 0.999, 1.0 - 2.0**-52, 1.0),
-    "inertia_z": (1e-12, 1e-3),
-    "pole": (1e-3, 1e-6, 1e-9, 1e-12, -1e-3),
-    "restitution": (-1.0, -1.0 + 2.0**-52, 0.0, 1.0),
-    "drop": (0.0, 1e-12, 1e6, 1e12),
-    "gravity": (1e-320, 1e-12, 1e-6, 1e6, 1e300, 0.0),
-    "speed": (1e-300, 1e-160, 1.0, 1e160, 1e300),
-    "length": (1e-320, 1e-300, 1e-150, 1e150, 1e300),
-    "air": (1e-15, 1e-12, 1e-3, 0.06, 1.0, 10.0, 1e3),
-    "unequal air": (1e-15, 1e-9, 0.06, 10.0),
+_ENDS = {
+    quantity: [[*map(float, ends.split())] for ends in columns]
+    for quantity, *columns in read_rows(__file__)
 }
-"""Ends of each quantity. Masses change by so many powers of ten from bottom to top, and a pole is
-how far μ is below where Eq. 13 is singular at 10°, relative."""
-TOGETHER: dict[str, tuple[float, float]] = {
-    "rods": (2, 200), "mass decades": (-12, 12), "alpha": (1e-12, 0.5),
-    "incline": (1e-9, 90 - 1e-9), "friction": (0.0, 0.839), "inertia": (1e-6, 1 - 1e-12),
-    "drop": (0.0, 1e9), "gravity": (1e-6, 1e6), "speed": (1e-6, 1e6),
-    "air": (1e-15, 10.0), "unequal air": (1e-12, 0.06),
-}  # fmt: skip
-"""Ends that are taken together by twos."""
+ALONE = {quantity: alone for quantity, (alone, _) in _ENDS.items()}
+TOGETHER = {quantity: together for quantity, (_, together) in _ENDS.items() if together}
+"""Ends of each quantity, by themselves and by twos."""
 _APART = ({"alpha", "incline"}, {"alpha", "friction"}, {"air", "unequal air"})
 """Pairs of which the one leaves the other out."""
 

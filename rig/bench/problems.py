@@ -8,12 +8,12 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import linalg, optimize
 
 from rig.analysis.adjust import least_squares
 from rig.analysis.equations import Linearization
 from rig.analysis.square_root import EquationRows
+from rig.arrays import Array
 from rig.bench import references
 from rig.bench.solvers import SOLVERS, Legs, folding, in_air, lasting_impacts, solve
 from rig.bench.work import Answer, Method, WorkProblem, direct, end_values
@@ -23,8 +23,6 @@ from rig.model.chain import Chain
 from rig.model.drag import drag_fall, drag_leg, fallen, falling_speed
 from rig.model.fall import fall, kicks
 from rig.model.impact import impact_on
-
-Array = NDArray[np.float64]
 
 KAPPA = 0.06
 """κ of the air, 1/m: a terminal speed of 13 m/s."""

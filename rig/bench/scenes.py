@@ -23,40 +23,17 @@ from rig.errors import RigError
 from rig.protocol.protocol import Protocol
 from rig.protocol.reader import parse
 from rig.streams import say
+from rig.text_rows import read_paragraphs, read_text
 from rig.text_table import text_table
 
+_TABLES = {heading: lines for heading, *lines in read_paragraphs(__file__)}
 PARTS = {
-    "surface": {"rig.model.impact", "rig.model.surface",
-                "impact coefficients", "falls", "falls in air"},
-    "inclined surface": {"g(θ)"},
-    "air": {"rig.model.drag", "falls in air"},
-    "gates": {"rig.protocol.gates"},
-    "figures": {"numpy", "scipy", "matplotlib", "textual"},
-}  # fmt: skip
+    part.strip(): {*names.strip().split(", ")}
+    for part, _, names in (line.partition("|") for line in _TABLES["Parts"])
+}
 """Modules and calls that only a scene with this part may need; no prediction has figures."""
 _PROBE = "from rig.bench.scene_probe import main; main()"
 _PROBES = 3
-
-_LEVEL = "surface: {restitution: 0.50}\ndrop: 180 mm\n"
-_INCLINED = "surface: {restitution: 0.50, friction: 0.20}\ndrop: 180 mm\n"
-_UNSURE = "surface: {restitution: 0.50 ± 0.05, friction: 0.20 ± 0.02}\ndrop: 180 mm ± 2 mm\n"
-_TWO, _AIR = "  B: {like: A}\n", "drag: {terminal_speed: 25 m/s}\n"
-_PLAN = "plan: {incline: 40 deg}\n"
-_PLANS = "plan: {incline: [30 deg, 40 deg, 50 deg, 60 deg, 70 deg, 80 deg], randomize: incline}\n"
-_GATES = """\
-gates:
-  impact: [{channel: 0, height: 22 mm}, {channel: 1, height: 34 mm}]
-  free: [{channel: 8, height: 20 mm}, {channel: 9, height: 60 mm}]
-release: {channel: 0, pulse: 80 ms}
-accept: {release_skew: 5 ms, missed_edges: 5 %}
-"""
-_CHAIN = """\
-protocol: 1
-title: measured
-gravity: 9.81 m/s^2
-chains:
-  A: {{rods: 25, length: 1165 mm, diameter: 12.7 mm, tilt: 12 deg{}}}
-"""
 
 
 class Cost(NamedTuple):
@@ -92,20 +69,9 @@ class Cost(NamedTuple):
 
 def ladder() -> dict[str, str]:
     """Return the paper's chain, from free fall to the whole experiment, as protocols by name."""
-    chain = _CHAIN.format("")
-    two = chain + _TWO + _UNSURE
-    return {
-        "free fall": chain,
-        "α given, level": _CHAIN.format(", alpha: 0.25, gamma: 1") + "surface: {}\ndrop: 180 mm\n",
-        "level surface": chain + _LEVEL,
-        "inclined": chain + _INCLINED + _PLAN,
-        "± on β, μ, drop": chain + _UNSURE + _PLAN,
-        "second chain": two + _PLAN,
-        "six inclines": two + _PLANS,
-        "gates": two + _PLANS + _GATES,
-        "air, no gates": two + _PLANS + _AIR,
-        "whole": two + _PLANS + _GATES + _AIR,
-    }
+    texts = {name: "\n".join(lines) + "\n" for name, lines in _TABLES.items()}
+    rows = (line.split("|") for line in _TABLES["Ladder"])
+    return {name.strip(): "".join(map(texts.__getitem__, pieces.split())) for name, pieces in rows}
 
 
 def run(arguments: Namespace) -> Iterator[Findings]:
@@ -128,7 +94,7 @@ def run(arguments: Namespace) -> Iterator[Findings]:
     yield Findings(
         {"python": sys.version.split()[0], "scenes": [cost._asdict() for cost in costs]},
         [*table, *_remarks(costs, whole)],
-        _HEAD,
+        read_text(__file__, "scenes.md").rstrip(),
         rows,
         scenes_figure(names, panels),
         failed=any(cost.gained for cost in costs),
@@ -233,12 +199,3 @@ def _remarks(costs: Sequence[Cost], whole: Cost) -> Iterator[str]:
         yield f"  {cost.scene}: {', '.join(without) or 'nothing'}"
     faults = [f"{cost.scene} gained {name}" for cost in costs for name in cost.gained]
     yield from ("", *(faults or ["no scene gained what it does not have"]))
-
-
-_HEAD = """\
-# What each scene leaves out
-
-`rig bench scenes`: what a scene does not have is neither loaded nor computed, or the bench fails.
-Counts are reproducible; times are of one machine. `rig check` says in words what was left out.
-
-![Costs of scenes](scenes.svg)"""

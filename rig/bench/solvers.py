@@ -11,14 +11,12 @@ from collections.abc import Callable, Sequence
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from rig.arrays import Array
 from rig.bench.work import Answer
 from rig.errors import RigError
 
-Array = NDArray[np.float64]
-Slope = Callable[[Array], Array]
 
 Solver = Literal["RK45", "DOP853", "Radau", "BDF", "LSODA"]
 SOLVERS: tuple[Solver, ...] = get_args(Solver)

@@ -1,6 +1,6 @@
 """Vectorized falls of a chain, with the same results as `rig.model.fall.fall` for each.
 
-Every step is that of `rig.model.fall.fall`, in its order, so that with the same α and γ not a bit
+Impacts are those of `rig.model.fall.after_impacts`, so that with the same α and γ not a bit
 differs as long as squares of its sizes are floats. α itself uses numpy's sine and cosine, which may
 differ from the C library's in the last digit; near a singular Eq. 13 that digit has more effect.
 
@@ -9,21 +9,18 @@ There are no errors or warnings: falls without a solution give `NaN`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from rig.model.chain import UNIFORM_ROD_INERTIA
+from rig.arrays import Array, Flags
+from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
+from rig.model.fall import after_impacts
 from rig.model.impact import alpha_level, contact_share, gamma_finite
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from rig.model.surface import Pile
-
-Floats: TypeAlias = NDArray[np.float64]
-Flags: TypeAlias = NDArray[np.bool_]
 
 # Falls computed together. A dozen arrays of this size fit into the second-level cache, and each is
 # long enough to make numpy's overhead for a call negligible.
@@ -41,8 +38,8 @@ class Impacts(NamedTuple):
         False where f = μN does not hold because the incline is below arctan μ.
     """
 
-    alpha: Floats
-    gamma: Floats
+    alpha: Array
+    gamma: Array
     sliding: Flags
 
 
@@ -101,7 +98,7 @@ def falls(
     drop: ArrayLike,
     gravity: ArrayLike,
     initial_speed: ArrayLike = 0.0,
-) -> Floats:
+) -> Array:
     """Return Δz, V and t of many falls (Eq. 9 and section III.D).
 
     Parameters
@@ -119,47 +116,21 @@ def falls(
         Δz, V and t as in `rig.model.fall.Fall`, each of the shape to which the inputs broadcast;
         `NaN` without a finite α.
     """
-    mass = _floats(masses)
-    above = np.cumsum(mass[:0:-1])[::-1]  # from the top, as in rig.model.chain.Chain.legs
-    legs = [*zip(np.diff(_floats(heights)).tolist(), (above / mass[:-1]).tolist(), strict=True)]
+    legs = Chain(tuple(_floats(masses).tolist()), tuple(_floats(heights).tolist())).legs
     inputs = impacts.alpha, impacts.gamma, *map(_floats, (drop, gravity, initial_speed))
-    shape = np.broadcast_shapes(*(array.shape for array in inputs))
-    flat = [np.broadcast_to(array, shape).reshape(-1) for array in inputs]
+    shaped = np.broadcast_arrays(*inputs)
+    flat = [array.reshape(-1) for array in shaped]
     ends = np.empty((3, flat[0].size))
     with np.errstate(all="ignore"):
         for start in range(0, flat[0].size, _BLOCK):
             block = slice(start, start + _BLOCK)
-            ends[:, block] = _block_ends(legs, *(array[block] for array in flat))
-    return ends.reshape(3, *shape)
+            alpha, gamma, way, g, speed = (array[block] for array in flat)
+            arrival = np.where(way == 0.0, speed, np.sqrt(speed * speed + 2.0 * g * way))
+            # A rod released on the contact point strikes at once; its leg's time was 0/0.
+            time = np.where(way == 0.0, 0.0, 2.0 * way / (speed + arrival))
+            ends[:, block] = after_impacts(legs, alpha, gamma, arrival, time, 2.0 * g, np.sqrt)
+    return ends.reshape(3, *shaped[0].shape)
 
 
-def _block_ends(legs: Sequence[tuple[float, float]], *inputs: Floats) -> tuple[Floats, ...]:
-    """Return Δz, V and t of falls, rod by rod; inputs as in `falls`, of shape ``(falls,)``."""
-    alpha, gamma, drop, gravity, initial_speed = inputs
-    twice_g = gravity * 2.0
-    arrival = np.sqrt(initial_speed * initial_speed + twice_g * drop)
-    # A rod released on the contact point strikes at once; its leg's time was 0/0.
-    arrival = np.where(drop == 0.0, initial_speed, arrival)
-    time = np.where(drop == 0.0, 0.0, 2.0 * drop / (initial_speed + arrival))
-    gained, separation, speed, step = np.zeros((4, drop.size))
-    # In place: a fresh array for each result takes longer than its arithmetic.
-    for gap, ratio in legs:
-        np.add(gamma, ratio, out=step)
-        np.divide(alpha, step, out=step)
-        step *= arrival  # Eq. 9
-        gained += step
-        np.add(arrival, step, out=speed)
-        np.multiply(speed, speed, out=arrival)
-        np.multiply(twice_g, gap, out=step)
-        arrival += step
-        np.sqrt(arrival, out=arrival)
-        speed += arrival
-        duration = np.divide(2.0 * gap, speed, out=speed)
-        time += duration
-        duration *= gained
-        separation += duration
-    return separation, arrival, time
-
-
-def _floats(values: ArrayLike) -> Floats:
+def _floats(values: ArrayLike) -> Array:
     return np.asarray(values, dtype=np.float64)

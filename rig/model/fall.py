@@ -8,14 +8,17 @@ two heights. Δz then keeps full relative precision as α → 0, and g → 0 cos
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from rig.errors import DomainError
 from rig.model.chain import Chain
 
-Leg = Callable[[float, float, float, int], tuple[float, float]]
+if TYPE_CHECKING:
+    from rig.model.impact import Number
 
+Leg = Callable[[float, float, float, int], tuple[float, float]]
 
 SMALL, LARGE = 1e-100, 1e100
 """Range of sizes whose squares are floats."""
@@ -151,26 +154,51 @@ def fall(
     arrival, time = free_leg(drop, initial_speed, gravity)
     if arrival == 0.0 == gravity:
         raise never_falls()
-    gained = separation = 0.0
-    twice_g, root = 2.0 * gravity, math.sqrt
-    # `free_leg` inlined: a call takes longer than its arithmetic (see ``./run bench bulk``).
     try:
-        for gap, ratio in chain.legs:
-            step = arrival * (alpha / (gamma + ratio))
-            gained += step
-            speed = arrival + step
-            arrival = root(speed * speed + twice_g * gap)
-            duration = 2.0 * gap / (speed + arrival)
-            time += duration
-            separation += gained * duration
+        ends = after_impacts(chain.legs, alpha, gamma, arrival, time, 2.0 * gravity, math.sqrt)
     except ZeroDivisionError:
-        arrival = math.inf
-    end = checked_fall(separation, arrival, time)
-    if not length and not unit:
-        return end
+        ends = 0.0, math.inf, time
+    end = checked_fall(*ends)
     return Fall(
-        math.ldexp(separation, length), math.ldexp(arrival, unit), math.ldexp(time, length - unit)
+        math.ldexp(end.separation_m, length),
+        math.ldexp(end.speed_m_s, unit),
+        math.ldexp(end.time_s, length - unit),
     )
+
+
+def after_impacts(
+    legs: Iterable[tuple[float, float]],
+    alpha: Number,
+    gamma: Number,
+    arrival: Number,
+    time: Number,
+    twice_g: Number,
+    root: Callable[[Number], Number],
+) -> tuple[Number, Number, Number]:
+    """Return Δz, V and t of a fall from the bottom rod's impact on; or of many falls, as arrays.
+
+    Parameters
+    ----------
+    legs
+        See `rig.model.chain.Chain.legs`.
+    arrival, time
+        Speed and time at the bottom rod's impact, m/s and s.
+    twice_g
+        2g, m/s².
+    root
+        Square root of such numbers.
+    """
+    gained = separation = 0.0 * time
+    # `free_leg` inlined: a call takes longer than its arithmetic (see ``./run bench bulk``).
+    for gap, ratio in legs:
+        step = arrival * (alpha / (gamma + ratio))  # Eq. 9
+        gained = gained + step
+        speed = arrival + step
+        arrival = root(speed * speed + twice_g * gap)
+        duration = 2.0 * gap / (speed + arrival)
+        time = time + duration
+        separation = separation + gained * duration
+    return separation, arrival, time
 
 
 def checked_fall(separation: float, speed: float, time: float) -> Fall:

@@ -14,12 +14,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from typing import TypeVar
 
-    import numpy as np
-    from numpy.typing import NDArray
-
+    from rig.arrays import Array
     from rig.model.surface import Surface
 
-    Number = TypeVar("Number", float, NDArray[np.float64])
+    Number = TypeVar("Number", float, Array)
 
 ALPHA, BETA, MU, PILE = "alpha", "restitution", "friction", "pile_restitution"
 """Names of the coefficients that a protocol states."""

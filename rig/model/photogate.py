@@ -10,18 +10,10 @@ from __future__ import annotations
 import math
 
 from rig.errors import InputError
+from rig.text_rows import read_rows
 
-LEDS = {"TSAL6100": (80.0, 400.0), "TSAL6200": (40.0, 200.0), "TSAL6400": (25.0, 125.0)}
-"""Radiant intensity at 0.1 A, least and greatest, mW/sr. From memory of Vishay 81009, 81010 and
-81011: compare with *Basic Characteristics* there."""
-DETECTORS = {
-    "BPW85": (0.8, 8.0, 25.0, 0.7, 2e-6, 100.0),
-    "BPW85C": (3.0, 8.0, 25.0, 0.7, 2e-6, 100.0),
-    "SFH309FA": (0.8, 4.0, 12.0, 0.35, 9e-6, 1000.0),
-}
-"""Photocurrent at 1 mW/cm², least and greatest, mA; half angle, degrees; share of daylight that it
-sees; switching time, s, at a load, Ω. Current and angle of the BPW85 are those of Vishay 81531
-(revision 2.1, *Product Summary*); all else is from memory of it and of Osram's SFH 309 FA."""
+PARTS = {part: [*map(float, values)] for part, *values in read_rows(__file__)}
+"""Values of LEDs and phototransistors by their names, as ``photogate.txt`` explains them."""
 THRESHOLD_V, HYSTERESIS_V = 1.22, 0.15  # 33 kΩ over 10 kΩ at 5 V; 220 kΩ from the output
 LED_OHM, LED_V, LED_A, ALIGNMENT = 68.0, 1.35, 0.05, 0.8
 APERTURE_M, LM_PER_MW_CM2 = 3e-3, 1100.0
@@ -36,10 +28,11 @@ def design_photogate(distance_m: float, slit_m: float, led: str, detector: str) 
     InputError
         The weakest pair receives too little light.
     """
-    least, most, angle, daylight, time_s, at_ohm = DETECTORS[detector]
+    least, most, angle, daylight, time_s, at_ohm = PARTS[detector]
+    dimmest, brightest = PARTS[led]
     share = min(1.0, 4 * slit_m / (math.pi * APERTURE_M))
     gain = 1e-2 * share / (100 * distance_m) ** 2  # A of light per A of the LED's: E = I/d²
-    weak, strong = gain * ALIGNMENT * LEDS[led][0] * least, gain * LEDS[led][1] * most
+    weak, strong = gain * ALIGNMENT * dimmest * least, gain * brightest * most
     load = next_standard(2 * THRESHOLD_V / (weak * LED_A))
     if load > 2e4:
         raise InputError("too little light", "move closer, or choose other parts or a wider slit")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import NamedTuple
 
-import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
+
+from rig.arrays import Array
 
 
 class GaussRule(NamedTuple):
@@ -22,9 +22,9 @@ class GaussRule(NamedTuple):
         through the values `f` at the nodes.
     """
 
-    nodes: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    running: NDArray[np.float64]
+    nodes: Array
+    weights: Array
+    running: Array
 
 
 @lru_cache(maxsize=64)

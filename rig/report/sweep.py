@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
+from rig.arrays import Array
 from rig.measurands import SEPARATION, SPEED, Measurand
-from rig.model.batch import Floats
 from rig.reasons import rig_error
 from rig.report.figure import WIDE_PT, Chart, Trace, chart
 from rig.report.looks import INK, MUTED
@@ -69,7 +69,7 @@ def sweep_figure(facts: Mapping[str, Any], layout: Layout, swept: Swept) -> Char
 
 def _panel(row: Measurand, layout: Layout, swept: Swept) -> dict[str, Any]:
     """Return a quantity along an axis, or as a map with an axis for its levels."""
-    values: Floats = getattr(swept, row.name)
+    values: Array = getattr(swept, row.name)
     axes: dict[str, Any] = {"row": row}
     for name, (varied, numbers) in zip("xy", layout.axes.items(), strict=False):
         axes[name] = VARIABLES[varied].label
@@ -83,7 +83,7 @@ def _panel(row: Measurand, layout: Layout, swept: Swept) -> dict[str, Any]:
     return {**axes, "places": next(iter(layout.axes.values())), "parts": parts}
 
 
-def _map(row: Measurand, layout: Layout, values: Floats, swept: Swept) -> Iterator[Trace]:
+def _map(row: Measurand, layout: Layout, values: Array, swept: Swept) -> Iterator[Trace]:
     """Yield the map, and its levels inside the model's domain."""
     across, up = map(list, layout.axes.values())
     whole = row.scale * values.T

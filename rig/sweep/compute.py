@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from rig.model.batch import Flags, Floats, Impacts, falls, given_impacts, surface_impacts
+from rig.arrays import Array, Flags
+from rig.model.batch import Impacts, falls, given_impacts, surface_impacts
 from rig.model.chain import XI
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
     from rig.sweep.layout import Layout
 
-    _Numbers: TypeAlias = float | Floats
+    _Numbers: TypeAlias = float | Array
 
 NOT_SLIDING, ABOVE_HALF, NO_ANSWER, PILE = 1, 2, 4, 8
 NOTES = {
@@ -52,8 +53,8 @@ class Swept:
         Sum of the bits in `NOTES` that apply.
     """
 
-    separation_m: Floats
-    speed_m_s: Floats
+    separation_m: Array
+    speed_m_s: Array
     notes: NDArray[np.uint8]
 
     @property
@@ -92,7 +93,7 @@ def compute(
     """
     size = layout.size
     separation, speed, notes = np.empty(size), np.empty(size), np.empty(size, np.uint8)
-    under_way: dict[Future[Floats], slice] = {}
+    under_way: dict[Future[Array], slice] = {}
     done = 0
 
     def collect() -> None:

@@ -10,8 +10,8 @@ from fractions import Fraction
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.errors import InputError
-from rig.model.batch import Floats
 from rig.model.chain import Chain
 from rig.model.surface import Pile
 from rig.protocol.protocol import Protocol
@@ -78,7 +78,7 @@ class Layout:
         for start in range(0, self.size, length):
             yield slice(start, min(start + length, self.size))
 
-    def along_axes(self, points: slice) -> dict[str, Floats]:
+    def along_axes(self, points: slice) -> dict[str, Array]:
         """Return the values of a piece's points, axis by axis."""
         numbers = np.unravel_index(np.arange(points.start, points.stop), self.shape)
         axes = zip(self.axes.items(), numbers, strict=True)
