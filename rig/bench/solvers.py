@@ -17,7 +17,6 @@ from rig.arrays import Array
 from rig.bench.work import Answer
 from rig.errors import RigError
 
-
 Solver = Literal["RK45", "DOP853", "Radau", "BDF", "LSODA"]
 SOLVERS: tuple[Solver, ...] = get_args(Solver)
 IMPLICIT: frozenset[Solver] = frozenset({"Radau", "BDF", "LSODA"})

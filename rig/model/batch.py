@@ -9,7 +9,7 @@ There are no errors or warnings: falls without a solution give `NaN`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,9 +18,7 @@ from rig.arrays import Array, Flags
 from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
 from rig.model.fall import after_impacts
 from rig.model.impact import alpha_level, contact_share, gamma_finite
-
-if TYPE_CHECKING:
-    from rig.model.surface import Pile
+from rig.model.surface import Pile
 
 # Falls computed together. A dozen arrays of this size fit into the second-level cache, and each is
 # long enough to make numpy's overhead for a call negligible.

@@ -10,9 +10,8 @@ from typing import Any
 from rig.model.chain import XI, Chain
 from rig.protocol.fields import Section, UnsoundError, join, read_value, unique_entries
 from rig.protocol.keys import Plain
-from rig.protocol.masses import place_masses
 from rig.protocol.protocol import RodChain
-from rig.protocol.rods import check_apart, count_rods, list_rods, place_rods
+from rig.protocol.rods import check_apart, count_rods, list_rods, place_masses, place_rods
 from rig.protocol.yamltree import Mapping, Sequence
 from rig.units import did_you_mean, quote
 

@@ -10,13 +10,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from operator import lt, sub
-from typing import TYPE_CHECKING
 
+from rig.model.chain import Chain
+from rig.protocol.protocol import Protocol, RodChain, Run
 from rig.units import Quantity
-
-if TYPE_CHECKING:
-    from rig.model.chain import Chain
-    from rig.protocol.protocol import Protocol, RodChain, Run
 
 
 def touching_heights(chain: RodChain, incline_deg: float) -> tuple[float, ...]:

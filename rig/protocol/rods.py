@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from itertools import accumulate, pairwise
-from typing import Any
 
-from rig.protocol.fields import Section
+from rig.protocol.fields import Section, UnsoundError
 from rig.protocol.keys import MOST_RODS
 from rig.units import Quantity, format_quantity
 
@@ -14,10 +13,15 @@ RodValues = tuple[float, ...]
 """A value for each rod, bottom up."""
 
 
+def list_groups(section: Section) -> list[tuple[int, Section]]:
+    """Return the groups of a chain whose ``rods`` are sound; equal rods have the chain's keys."""
+    rods = section["rods"]
+    return [(rods, section)] if isinstance(rods, int) else [(each["count"], each) for each in rods]
+
+
 def count_rods(section: Section) -> int:
     """Return the number of rods of a chain whose ``rods`` are sound."""
-    rods = section["rods"]
-    return rods if isinstance(rods, int) else sum(group["count"] for group in rods)
+    return sum(count for count, _ in list_groups(section))
 
 
 def list_rods(section: Section, top: Section) -> tuple[RodValues, RodValues, bool]:
@@ -39,7 +43,11 @@ def list_rods(section: Section, top: Section) -> tuple[RodValues, RodValues, boo
     if total == 1 and "surface" in top:
         message = "found 1 rod; a chain that strikes a surface has at least 2"
         section.reject("rods", f"{message}; for one object leave surface out")
-    diameters, masses = (_list_values(section, key, total) for key in ("diameter", "mass"))
+    each = [group for count, group in list_groups(section) for _ in range(count)]
+    diameters, masses = (
+        [section[key] if rod[key] is None else rod[key] for rod in each]
+        for key in ("diameter", "mass")
+    )
     weighed = None not in masses
     if not weighed and any(masses):
         section.reject("rods", "mass is given for some groups only; state it for all or none")
@@ -51,17 +59,6 @@ def list_rods(section: Section, top: Section) -> tuple[RodValues, RodValues, boo
     if not weighed:
         masses = [(d / diameters[0]) ** 2 if diameters[0] else 1.0 for d in diameters]
     return tuple(diameters), tuple(masses), weighed
-
-
-def _list_values(section: Section, key: str, total: int) -> list[Any]:
-    """Return the value of each rod from its group or the chain, bottom up; `None` if missing."""
-    groups = section["rods"]
-    if isinstance(groups, int):
-        return [section[key]] * total
-    values = ((group["count"], group[key]) for group in groups)
-    return [
-        section[key] if value is None else value for count, value in values for _ in range(count)
-    ]
 
 
 def place_rods(section: Section, diameters: RodValues) -> RodValues:
@@ -122,3 +119,51 @@ def check_apart(section: Section, heights: RodValues, widths: RodValues, rise: f
             height = format_quantity(Quantity(rise), "mm")
             message = f"tilted ends rise {height}, so rods {rod} and {rod + 1} would touch"
             section.reject("rod_length", message)
+
+
+def place_masses(chain: Section, heights: RodValues) -> RodValues:
+    """Return the mass of each rod, kg, bottom up.
+
+    Masses are listed rod by rod; or follow ``{exponential: {bottom: …, top: …}}``, with a constant
+    ratio from each rod to the next; or ``{table: [{height: …, mass: …}, …]}``, with linear
+    interpolation.
+
+    Parameters
+    ----------
+    chain
+        The chain with its ``masses``.
+    heights
+        Heights of the rods' middles above that of the bottom rod, m.
+    """
+    masses, rods = chain["masses"], len(heights)
+    if isinstance(masses, tuple):
+        if len(masses) != rods:
+            message = f"found {len(masses)} masses for {rods} rods; state one for each rod"
+            chain.reject("masses", message)
+        return masses
+    profile = masses and masses.need("exponential", "table")
+    if not profile or not masses.is_sound():
+        raise UnsoundError
+    if profile == "table":
+        return _interpolate(masses, heights)
+    if rods == 1:
+        masses.reject("exponential", "one object has one mass; state it as mass", at_key=True)
+    bottom, top = masses["exponential"]["bottom"], masses["exponential"]["top"]
+    between = ((top / bottom) ** (rod / (rods - 1)) for rod in range(1, rods - 1))
+    return (bottom, *(bottom * share for share in between), top)
+
+
+def _interpolate(masses: Section, heights: RodValues) -> RodValues:
+    """Return masses by linear interpolation in a table."""
+    import numpy as np  # noqa: PLC0415 - most chains have no table
+
+    table = masses["table"]
+    places = [point["height"] for point in table]
+    for n, (low, high) in enumerate(pairwise(places), start=1):
+        if low >= high:
+            table[n].reject("height", "heights must increase from point to point")
+    # Rounding may raise a height that is summed from rods above the written value.
+    if places[0] > 0.0 or places[-1] < heights[-1] * (1.0 - 1e-12):
+        message = f"runs from {places[0]:g} m to {places[-1]:g} m; the rods are from 0 m"
+        masses.reject("table", f"{message} to {heights[-1]:g} m")
+    return tuple(np.interp(heights, places, [point["mass"] for point in table]).tolist())

@@ -28,14 +28,10 @@ _QUOTE_OR_BRACKET = re.compile(
     r"\"[^\"\n]*\"|'[^'\n]*'|(?<![^\s\[{,:])(?P<open>[\"'])[^\n]*|[\[\]{}]"
 )
 NOT_READABLE = "this line cannot be read from here on: see its quotes, brackets, colons and indent"
-_MISTAKES, _SURPLUS = read_paragraphs(__file__)
-_INDENT = re.compile(r"^( *)((?:- )?)(?![ #\n])", re.MULTILINE)
-_COMPOSED = {
-    "but found another document": "a second document; a file has one protocol",
-    "second occurrence": "an anchor of this name is given above; choose another name",
-    "found undefined alias": "no anchor stands before the alias",
-}
+_MISTAKES, _SURPLUS, _REFUSED = read_paragraphs(__file__)
+_COMPOSED = dict(re.split(r" +\| ", row) for row in _REFUSED)
 """What PyYAML's composer refuses, and in which words."""
+_INDENT = re.compile(r"^( *)((?:- )?)(?![ #\n])", re.MULTILINE)
 _NEW = {"nothing": "", "blank": " ", "colon": ": "}
 Mend = tuple[int, str, str]
 """A place in a text, what is wrong there, and the text as it should be."""
@@ -61,7 +57,8 @@ def explain(text: str, error: yaml.MarkedYAMLError) -> tuple[int, str]:
         words, mark, name = str(error.problem).partition(" '")
         return stop, f"{_COMPOSED.get(words, words)}{mark}{name}"
     begin = error.context_mark.index if error.context_mark else stop
-    at = _visible(text, stop)
+    # At the end of a text that of its last visible character.
+    at = stop if text[stop:].strip() else max(len(text.rstrip()) - 1, 0)
     farther = None
     mends = chain(
         _list_mends(text, at, begin, _MISTAKES),
@@ -166,8 +163,3 @@ def _line_start(text: str, index: int) -> int:
 def _line_end(text: str, index: int) -> int:
     end = text.find("\n", index)
     return len(text) if end < 0 else end
-
-
-def _visible(text: str, index: int) -> int:
-    """Return the index, or that of the last visible character at the end of a text."""
-    return index if text[index:].strip() else max(len(text.rstrip()) - 1, 0)

@@ -8,25 +8,19 @@ grid is cut nor who computes a piece can be seen in the results.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, TypeAlias
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.arrays import Array, Flags
 from rig.model.batch import Impacts, falls, given_impacts, surface_impacts
 from rig.model.chain import XI
+from rig.sweep.layout import Layout
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from numpy.typing import NDArray
-
-    from rig.sweep.layout import Layout
-
-    _Numbers: TypeAlias = float | Array
-
+_Numbers = float | Array
 NOT_SLIDING, ABOVE_HALF, NO_ANSWER, PILE = 1, 2, 4, 8
 NOTES = {
     NOT_SLIDING: "the rod does not slide",
@@ -40,8 +34,7 @@ _RODS_IN_CHUNK = 2_500_000  # 30 ms or so: nobody waits long for a running piece
 _LONGEST_CHUNK = 100_000  # of chains of few rods: a piece's coefficients are made in one go
 
 
-@dataclass(frozen=True, slots=True)
-class Swept:
+class Swept(NamedTuple):
     """Results at every point; all arrays have the shape of the grid.
 
     Attributes

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Container, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,8 +25,7 @@ MOST_VALUES = 1_000_000
 _EXAMPLE = "write for example restitution=-0.4..0.9:200 or incline=40deg"
 
 
-@dataclass(frozen=True, slots=True)
-class Layout:
+class Layout(NamedTuple):
     """One sweep, ready to be computed: all combinations of the axes' values, the last fastest.
 
     Attributes

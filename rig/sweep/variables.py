@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from rig.model.chain import XI
 from rig.model.impact import BETA, MU
@@ -12,8 +12,7 @@ from rig.reasons import rig_error
 from rig.text_rows import read_rows
 
 
-@dataclass(frozen=True, slots=True)
-class Variable:
+class Variable(NamedTuple):
     """One parameter.
 
     Attributes
