@@ -1,7 +1,5 @@
 """Scenes at the ends of what can be asked: each quantity by itself, and every two together."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 from decimal import Decimal

@@ -1,7 +1,5 @@
 """What a study found, for people and for programs; `rig.commands.study` keeps and prints it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

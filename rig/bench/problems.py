@@ -1,7 +1,5 @@
 """The problems of `rig bench precision`, each with every method that applies, ours first."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from functools import partial

@@ -4,8 +4,6 @@ Nothing of `rig.model` is used, floats are taken at their exact value, and no ca
 digits, since there are plenty: times are (V' − V)/g, and Δz is a difference of heights.
 """
 
-from __future__ import annotations
-
 import decimal
 import math
 import sys

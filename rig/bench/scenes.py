@@ -4,8 +4,6 @@ Counts are the same on every run of a Python version. Processor times are not: e
 in every round, ratios are taken within a round, and medians are given.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

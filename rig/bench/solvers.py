@@ -4,8 +4,6 @@ All are given the same equations, locate impacts by the same event and take tole
 implicit ones have the Jacobian.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, Literal, NamedTuple, get_args

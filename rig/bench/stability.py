@@ -5,8 +5,6 @@ how many times their relative errors grow. An error beyond that, but for the rou
 all rods, is a fault of the program.
 """
 
-from __future__ import annotations
-
 import math
 import warnings
 from decimal import Decimal

@@ -5,8 +5,6 @@ accuracy parameter, cheapest setting first. All settings of a problem take turns
 so that a machine that slows down slows all of them down; only processor time counts.
 """
 
-from __future__ import annotations
-
 import math
 import statistics
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Drops as they would fall, and what each beam would say of their unknowns."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A protocol's text with its gates at other heights, and all else as it stands there."""
 
-from __future__ import annotations
-
 import re
 
 from rig.protocol.protocol import SIDES, Protocol

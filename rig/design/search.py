@@ -3,8 +3,6 @@
 Beams that tell most must also be read: a layout whose edges could be given to wrong rods is none.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence

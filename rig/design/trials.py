@@ -5,8 +5,6 @@ are let go one after the other. A drop is read if it is not void for what its ed
 every edge that is given to a rod is that rod's.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """The best single α of every run and condition, and whether they agree."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Δz(t) and V²(z) of a measured drop, with bands (the paper's Fig. 4)."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

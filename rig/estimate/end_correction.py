@@ -1,7 +1,5 @@
 """Is Eq. 11's end correction needed: γ left open, by Eq. 10, and without."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from rig.analysis.distributions import chi2_tail

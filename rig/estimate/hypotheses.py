@@ -1,7 +1,5 @@
 """What may be supposed of the impacts: from the coefficients of the model down to rod by rod."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ evenly spaced nodes, which for a smooth density that vanishes at both ends conve
 any power of their number. Nothing is drawn at random.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

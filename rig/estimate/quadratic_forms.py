@@ -8,8 +8,6 @@ impacts is then a few small matrices away: no edge is looked at again, and none 
 say is lost.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

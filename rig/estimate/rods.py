@@ -1,7 +1,5 @@
 """The impulse of every rod, measured, beside Eq. 9."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Everything that a session says of the impacts."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple

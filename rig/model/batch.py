@@ -7,8 +7,6 @@ differ from the C library's in the last digit; near a singular Eq. 13 that digit
 There are no errors or warnings: falls without a solution give `NaN`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

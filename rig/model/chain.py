@@ -1,7 +1,5 @@
 """A chain of rods: masses, heights and inertia for the mechanics."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, pairwise

@@ -27,8 +27,6 @@ Where the paper's text and its equations part (25 rods over 1.165 m, h = 0.18 m,
   orders in α, against Eq. 15, which is of first order.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

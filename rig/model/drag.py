@@ -14,8 +14,6 @@ same expression as the sum κd + ln((v₁ + u)/(v₀ + u)), over √(κg), u bei
 At κ = 0 every number is that of `rig.model.fall`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """The paper's scenes, its figures as numbers, and differences between its text and equations."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import accumulate, pairwise, product

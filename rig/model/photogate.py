@@ -5,8 +5,6 @@ gives twice the comparator's threshold. So the threshold is at half light, and e
 equal delays for all parts. firmware/README.md has the formulas and their sources.
 """
 
-from __future__ import annotations
-
 import math
 
 from rig.errors import InputError

@@ -1,7 +1,5 @@
 """Predictions with uncertainty for one chain on one surface."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The model's prediction for a scene, with or without a surface."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Any
 

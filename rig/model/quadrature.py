@@ -1,7 +1,5 @@
 """Gauss–Legendre quadrature for smooth integrands on an interval."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import NamedTuple
 

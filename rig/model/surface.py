@@ -1,7 +1,5 @@
 """The surface that a chain strikes, and the pile of rods on it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from rig.units import Quantity

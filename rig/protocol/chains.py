@@ -1,7 +1,5 @@
 """The ``chains`` of a protocol: masses, heights and widths from the description of rods."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 from contextlib import suppress

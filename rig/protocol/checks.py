@@ -4,8 +4,6 @@ Rules for single keys are in `rig.protocol.keys`; those for the rods of a chain 
 `rig.protocol.chains`, and those for gates and rods in `rig.protocol.gates`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from math import prod
 

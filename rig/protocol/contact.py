@@ -5,8 +5,6 @@ touches it with one end when its middle is L sin τ/2 + r √(1 − sin²τ cos�
 measured straight down.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from operator import lt, sub

@@ -3,8 +3,6 @@
 The words are in ``describe.txt``; this module computes the facts that they need.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise, product

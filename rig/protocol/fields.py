@@ -5,8 +5,6 @@ A `Section` reads all its keys at once. A faulty or missing required value is no
 between keys.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, NoReturn

@@ -1,7 +1,5 @@
 """The ``gates`` of a protocol, and whether each beam is clear before the release."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterable, Iterator
 from typing import NamedTuple

@@ -4,8 +4,6 @@ The rig drops chains from rest; the length of a recording is limited, as is a bo
 inputs and outputs.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 

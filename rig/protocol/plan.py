@@ -1,7 +1,5 @@
 """Expansion of a plan into its runs, in the order of execution."""
 
-from __future__ import annotations
-
 from itertools import product
 from typing import TypeVar
 

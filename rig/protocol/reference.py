@@ -3,8 +3,6 @@
 Tests read every example of the table with the reader itself.
 """
 
-from __future__ import annotations
-
 from string import Template
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The rods of a chain: diameters, masses and heights."""
 
-from __future__ import annotations
-
 import math
 from itertools import accumulate, pairwise
 

@@ -1,7 +1,5 @@
 """Local gravity from latitude and height."""
 
-from __future__ import annotations
-
 import math
 
 from rig.units import Quantity

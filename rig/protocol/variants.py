@@ -4,8 +4,6 @@
 every value is checked by the rules of its key, at its own place.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import product

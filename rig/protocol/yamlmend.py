@@ -5,8 +5,6 @@ which it continues. So the mistakes of ``yamlmend.txt`` are searched for around 
 change is tested by the parser.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

@@ -6,8 +6,6 @@ roots, which are the same everywhere. Nor does a point depend on its neighbours,
 grid is cut nor who computes a piece can be seen in the results.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from typing import NamedTuple

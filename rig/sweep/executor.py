@@ -3,8 +3,6 @@
 Falls of a piece are few large operations of numpy, during which other threads go on.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator
 from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor

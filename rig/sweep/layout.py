@@ -1,7 +1,5 @@
 """From a protocol and ``NAME=LOW..HIGH:COUNT`` to the grid and all that stays as it is."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Container, Iterable, Iterator, Sequence

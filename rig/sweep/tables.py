@@ -1,7 +1,5 @@
 """Results of a sweep as a CSV table and as NumPy arrays, each with where it comes from."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The parameters of which a sweep can make an axis, and which of them a scene has."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from rig.model.chain import XI
