@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from rig.errors import DomainError
 from rig.model.chain import Chain
@@ -43,8 +43,7 @@ class Fall:
     time_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class Hit:
+class Hit(NamedTuple):
     """A rod's impact: time, and the chain's speed before and after, downward positive."""
 
     time_s: float

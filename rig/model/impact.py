@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from rig.errors import DomainError
 from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
@@ -24,8 +24,7 @@ ALPHA, BETA, MU, PILE = "alpha", "restitution", "friction", "pile_restitution"
 _BASES = {(ALPHA,): "given", (PILE,): "pile", (BETA,): "level", (BETA, MU): "surface"}
 
 
-@dataclass(frozen=True, slots=True)
-class Impact:
+class Impact(NamedTuple):
     """Coefficients of a rod's impulse on the chain above, J = α m V / (1 + γ m/M), Eq. 9.
 
     Attributes

@@ -18,6 +18,7 @@ import yaml
 
 from rig.errors import InputError, Problem
 from rig.printable import one_line
+from rig.text_rows import read_rows
 from rig.units import quote
 
 MAX_DEPTH = 32
@@ -28,15 +29,8 @@ _TAB = re.compile(r"^[^\t#\n]*\t", re.MULTILINE)
 """A tab outside comments, which YAML accepts only in some places."""
 _EXCERPT = 72  # columns of a terminal of 80, less an indent
 
-# Scalars of the YAML 1.2 core schema (section 10.3.2); anything else is text, so
-# `on`, `yes`, `12:30:00` and `2024-01-01` are text and `1e-3` is a number.
-_CORE = (
-    ("nothing", re.compile(r"null|Null|NULL|~|")),
-    ("a boolean", re.compile(r"true|True|TRUE|false|False|FALSE")),
-    ("a whole number", re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")),
-    ("a number", re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")),
-    ("a number", re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")),
-)
+_CORE = {kind: re.compile(pattern) for kind, pattern in read_rows(__file__, mark=" / ")}
+"""Scalars of the core schema, see ``yamltree.txt``."""
 
 
 class Place(NamedTuple):
@@ -57,7 +51,7 @@ class ScalarNode:
     @property
     def kind(self) -> str:
         """Type of the scalar in the core schema, as a noun."""
-        kinds = (kind for kind, pattern in _CORE if pattern.fullmatch(self.text))
+        kinds = (kind for kind, pattern in _CORE.items() if pattern.fullmatch(self.text))
         return next(kinds, "text") if self.plain else "text"
 
     def __str__(self) -> str:

@@ -6,8 +6,10 @@ roots, which are the same everywhere. Nor does a point depend on its neighbours,
 grid is cut nor who computes a piece can be seen in the results.
 """
 
+from collections import deque
 from collections.abc import Callable, Mapping
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import Executor, Future
+from itertools import islice
 from typing import NamedTuple
 
 import numpy as np
@@ -82,34 +84,26 @@ def compute(
     show
         Called with the number of points done after each piece.
     """
-    size = layout.size
+    size, chain = layout.size, layout.chain
     separation, speed, notes = np.empty(size), np.empty(size), np.empty(size, np.uint8)
-    under_way: dict[Future[Array], slice] = {}
-    done = 0
 
-    def collect() -> None:
-        nonlocal done
-        for future in wait(under_way, return_when=FIRST_COMPLETED).done:
-            place = under_way.pop(future)
-            separation[place], speed[place], _ = future.result()
-            done += place.stop - place.start
-            show(done)
+    def submit(place: slice) -> tuple[slice, Future[Array]]:
+        values = layout.fixed_values | layout.along_axes(place)
+        impacts = _impacts(layout, values)
+        notes[place] = _notes(layout, values, impacts)
+        inputs = values["drop"], values["gravity"], values.get("initial_speed", 0.0)
+        return place, executor.submit(falls, chain.masses, chain.heights, impacts, *inputs)
 
+    pieces, under_way = map(submit, layout.chunks(length)), deque[tuple[slice, Future[Array]]]()
     try:
-        for place in layout.chunks(length):
-            if len(under_way) >= slots:
-                collect()
-            values = layout.fixed_values | layout.along_axes(place)
-            impacts = _impacts(layout, values)
-            notes[place] = _notes(layout, values, impacts)
-            inputs = values["drop"], values["gravity"], values.get("initial_speed", 0.0)
-            chain = layout.chain
-            future = executor.submit(falls, chain.masses, chain.heights, impacts, *inputs)
-            under_way[future] = place
+        under_way.extend(islice(pieces, slots))
         while under_way:
-            collect()
+            place, future = under_way.popleft()
+            separation[place], speed[place], _ = future.result()
+            under_way.extend(islice(pieces, 1))
+            show(place.stop)
     finally:
-        for future in under_way:
+        for _, future in under_way:
             future.cancel()
     separation += layout.longer_m
     notes[np.isnan(separation)] = NO_ANSWER

@@ -157,49 +157,48 @@ def read_vary(texts: Iterable[str], names: Sequence[str]) -> dict[str, tuple[flo
     return varied_values
 
 
+_VARY = re.compile(r"(?s)(?P<name>[^=]*)=(?P<low>.*?)(\.\.(?P<high>[^:]*)(:(?P<count>.*))?)?")
+
+
 def _read(text: str, names: Sequence[str], taken: Container[str]) -> tuple[str, tuple[float, ...]]:
-    before, equals, after = text.partition("=")
-    name, start = before.strip(), len(before) + 1
-    if not equals:
+    parts = _VARY.fullmatch(text)
+    if parts is None:
         raise _FaultError(0, _EXAMPLE)
+    name, low, high, count = (part and part.strip() for part in parts.group(*_VARY.groupindex))
+    middle = parts.start("high")
     if name not in names:
         guess = did_you_mean(name, tuple(names))
         raise _FaultError(0, f"not in this scene; {guess}it can vary: {', '.join(names)}")
     if name in taken:
         raise _FaultError(0, "given twice; keep one of them")
-    if ".." not in after:
-        if ":" in after:
-            raise _FaultError(start, f"a range is LOW..HIGH:COUNT; {_EXAMPLE}")
-        return name, (_value(name, after, start),)
-    low, _, rest = after.partition("..")
-    high, colon, count = rest.partition(":")
-    middle = start + len(low) + 2
-    if high.startswith("."):  # 1...5 may be 1. to .5 or a slip
-        raise _FaultError(
-            middle - 2, "between LOW and HIGH are two dots, and before a dot is a digit"
-        )
-    ends = _value(name, low, start), _value(name, high, middle)
+    if high is None:
+        if ":" in low:
+            raise _FaultError(parts.start("low"), f"a range is LOW..HIGH:COUNT; {_EXAMPLE}")
+        return name, (_value(name, parts, "low"),)
+    if parts["high"].startswith("."):  # 1...5 may be 1. to .5 or a slip
+        message = "between LOW and HIGH are two dots, and before a dot is a digit"
+        raise _FaultError(middle - 2, message)
+    ends = _value(name, parts, "low"), _value(name, parts, "high")
     if not ends[0] < ends[1]:
-        raise _FaultError(middle, f"found {high.strip()}; it must be more than {low.strip()}")
-    if not colon:
-        raise _FaultError(middle + len(high), f"say how many values: {text.strip()}:81")
-    digits, column = count.strip(), middle + len(high) + 1
-    if not (re.fullmatch("[0-9]{1,9}", digits) and 2 <= int(digits) <= MOST_VALUES):
-        message = f"found {quote(digits)}; a whole number from 2 to {MOST_VALUES} is wanted"
-        raise _FaultError(column, message)
-    return name, linspace(*ends, int(digits))
+        raise _FaultError(middle, f"found {high}; it must be more than {low}")
+    if count is None:
+        raise _FaultError(parts.end("high"), f"say how many values: {text.strip()}:81")
+    if not (re.fullmatch("[0-9]{1,9}", count) and 2 <= int(count) <= MOST_VALUES):
+        message = f"found {quote(count)}; a whole number from 2 to {MOST_VALUES} is wanted"
+        raise _FaultError(parts.start("count"), message)
+    return name, linspace(*ends, int(count))
 
 
-def _value(name: str, text: str, column: int) -> float:
-    accepted = VARIABLES[name].accepted
+def _value(name: str, parts: re.Match[str], part: str) -> float:
+    accepted, text = VARIABLES[name].accepted, parts[part].strip()
     try:
-        read = parse(text.strip(), accepted.dimension)
+        read = parse(text, accepted.dimension)
     except UnitError as error:
-        raise _FaultError(column, str(error)) from None
+        raise _FaultError(parts.start(part), str(error)) from None
     if read.u > 0:
-        raise _FaultError(column, f"found {text.strip()}; no uncertainty is used here")
+        raise _FaultError(parts.start(part), f"found {text}; no uncertainty is used here")
     if read.value not in accepted:
-        raise _FaultError(column, f"found {text.strip()}; accepted: {accepted}")
+        raise _FaultError(parts.start(part), f"found {text}; accepted: {accepted}")
     return read.value
 
 
