@@ -3,8 +3,10 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Any
 
 from rig.errors import DomainError
+from rig.measurands import FALL_TIME, SEPARATION, SPEED
 from rig.model.chain import Chain
 from rig.model.fall import Fall, fall, free_leg, kicks
 from rig.model.impact import MU, impact_on, stated_coefficients, with_coefficients
@@ -13,6 +15,8 @@ from rig.model.surface import Surface
 from rig.units import Quantity
 
 AT_REST = Quantity(0.0)
+ENDS = {SEPARATION: "separation_m", SPEED: "speed_m_s", FALL_TIME: "time_s"}
+"""What is predicted, and where a `Fall` has it."""
 LEAST = {MU: 0.0}
 """Coefficients that cannot be below a value."""
 
@@ -76,7 +80,7 @@ def predict(
         return drag_fall(chain, gains, [drag * kappa for kappa in kappas], *place)
 
     end, notes = fall_with(), [*impact.notes]
-    u: dict[str, float] = {}
+    values: dict[str, Any] = {row.name: getattr(end, name) for row, name in ENDS.items()}
     moves = {
         "alpha": _moved_alphas(chain, surface, incline_deg),
         "drop": steps(drop, least=0.0),
@@ -94,9 +98,9 @@ def predict(
     except DomainError as error:
         notes.append(f"no uncertainty: within that of μ, {error.message}")
     else:
-        for name in ("separation_m", "speed_m_s", "time_s"):
+        for row, name in ENDS.items():
             slopes = ((getattr(b, name) - getattr(a, name)) * weight for a, b, weight in spread)
-            u[name] = math.hypot(*slopes)
+            values[row.key("u")] = math.hypot(*slopes)
     if impact.basis == "pile":
         notes.append("rods gather on a pile: taken as level with the pile's restitution")
     basis = "" if impact.basis in {"surface", "level"} else f", {impact.basis}"
@@ -105,14 +109,9 @@ def predict(
         model=f"discrete{basis}{air}",
         alpha=impact.alpha,
         gamma=impact.gamma,
-        separation_m=end.separation_m,
-        separation_u_m=u.get("separation_m"),
-        speed_m_s=end.speed_m_s,
-        speed_u_m_s=u.get("speed_m_s"),
-        fall_time_s=end.time_s,
-        fall_time_u_s=u.get("time_s"),
         in_domain=not impact.notes,
         notes=notes,
+        **values,
     )
 
 

@@ -3,35 +3,30 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
 from itertools import count, pairwise
 from string import Template
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 from rig.errors import InputError
 from rig.protocol.keys import KEYS
 from rig.protocol.protocol import Protocol, Side
 from rig.protocol.reader import parse
-from rig.text_rows import read_text
+from rig.text_rows import read_rows, read_text
 
 Scene = Literal["two-chains", "one-chain", "object", "track", "picket-fence"]
 SCENES: tuple[Scene, ...] = get_args(Scene)
 
-# In order of importance: the lowest first, for the final speed, then those before the first strike.
-# Each is an intended height in m, and the largest share of the free distance.
-_LOW: dict[Side, tuple[tuple[float, float], ...]] = {
-    "impact": ((0.025, 0.11), (0.070, 0.38), (0.130, 0.75), (0.045, 0.22)),
-    "free": ((0.020, 0.08), (0.080, 0.44), (0.150, 0.87), (0.110, 0.62)),
+_PLACES = {
+    name: [[*map(float, place.split())] for place in places]
+    for name, *places in read_rows(__file__, "draft_gates.txt")
 }
-_HIGH = (0.02, 0.15, 0.5, 0.9, 0.3, 0.7, 0.08, 0.4, 0.6, 0.8, 0.22, 0.98)
-"""Shares of the length for gates between hanging rods, in order of importance."""
+"""Where gates go, in order of importance."""
 _CLEAR = 1.5e-3
 _FIRST = 0.06  # share of a single object's path before its first gate
 _LAST = 0.1  # height of the lowest gate as a share of the drop height
 
 
-@dataclass(frozen=True, slots=True)
-class Draft:
+class Draft(NamedTuple):
     """Answers about a set-up, in the notation of a protocol file.
 
     Attributes
@@ -58,7 +53,7 @@ class Draft:
     def trial(self) -> Draft:
         """Return the draft with four drops, at the middle incline."""
         inclines = self.inclines.strip(" ,").split(",")
-        return replace(self, inclines=inclines[len(inclines) // 2].strip(), repeats=4)
+        return self._replace(inclines=inclines[len(inclines) // 2].strip(), repeats=4)
 
 
 def draft_text(draft: Draft) -> str:
@@ -88,7 +83,7 @@ def _text(draft: Draft, gates: str) -> str:
     """Return the text of the file with these gates; defaults are those of the table of keys."""
     scenes = ((line[:_WIDTH].split(), line[_WIDTH:]) for line in _LINES)
     lines = [text for scenes_of_line, text in scenes if draft.scene in (scenes_of_line or SCENES)]
-    values = {name: str(getattr(draft, name)) for name in Draft.__slots__}
+    values = {name: str(getattr(draft, name)) for name in Draft._fields}
     values |= {path.replace(".", "_"): key.default for path, key in KEYS.items() if "." in path}
     values |= {"title": json.dumps(draft.title, ensure_ascii=False), "gates": gates}
     return Template("\n".join(lines) + "\n").substitute(values)
@@ -124,13 +119,13 @@ def _low_and_high(protocol: Protocol, side: Side, number: int) -> list[float]:
     half = max(rods.widths) / 2.0
     low = half + _CLEAR
     way = drop.value - half - max(_CLEAR, drop.u) - low
-    heights = [max(low, min(meant, low + share * way)) for meant, share in _LOW[side][:number]]
+    heights = [max(low, min(meant, low + share * way)) for meant, share in _PLACES[side][:number]]
     gaps = [
         drop.value + (low + high) / 2.0
         for low, high in pairwise(rods.chain.heights)
         if high - low > 2.0 * (half + max(_CLEAR, drop.u))
     ]
-    for share in _HIGH[: min(number - len(heights), len(gaps))]:
+    for (share,) in _PLACES["between"][: min(number - len(heights), len(gaps))]:
         target = drop.value + share * rods.chain.length
         _, gap = min((abs(gap - target), gap) for gap in gaps)
         gaps.remove(gap)

@@ -159,8 +159,7 @@ class Contact:
     from_board: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class InclinedTrack:
+class InclinedTrack(NamedTuple):
     """Inclined track down which an object slides or rolls.
 
     Attributes
@@ -183,8 +182,7 @@ class InclinedTrack:
         return Quantity(share * gravity.value * sin(slope), u)
 
 
-@dataclass(frozen=True, slots=True)
-class Drag:
+class Drag(NamedTuple):
     """Drag proportional to the square of the speed.
 
     Attributes
@@ -209,8 +207,7 @@ class Drag:
         return self.coefficient.u / self.coefficient.value if self.coefficient else 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class ReleasePulse:
+class ReleasePulse(NamedTuple):
     """The actuator: its channel and the length of the pulse in seconds."""
 
     channel: int = DEFAULTS["release.channel"]

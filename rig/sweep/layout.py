@@ -14,7 +14,7 @@ from rig.model.chain import Chain
 from rig.model.surface import Pile
 from rig.protocol.protocol import Protocol
 from rig.reasons import rig_error
-from rig.sweep.variables import VARIABLES, scene_values
+from rig.sweep.variables import VARIABLES, Grid, scene_values
 from rig.units import UnitError, did_you_mean, parse, quote
 
 MOST_POINTS = 20_000_000
@@ -43,7 +43,7 @@ class Layout(NamedTuple):
         Whether a chain falls freely beside it; without, Δz is from a twin that nobody hung.
     """
 
-    values: dict[str, tuple[float, ...]]
+    values: Grid
     layered: bool
     chain: Chain
     longer_m: float
@@ -51,7 +51,7 @@ class Layout(NamedTuple):
     two_chains: bool
 
     @property
-    def axes(self) -> dict[str, tuple[float, ...]]:
+    def axes(self) -> Grid:
         """Values of the parameters that vary."""
         return {name: numbers for name, numbers in self.values.items() if len(numbers) > 1}
 
@@ -119,7 +119,7 @@ class _FaultError(Exception):
     """The column (from 0) at which the part of a text starts that is wrong, and the message."""
 
 
-def read_vary(texts: Iterable[str], names: Sequence[str]) -> dict[str, tuple[float, ...]]:
+def read_vary(texts: Iterable[str], names: Sequence[str]) -> Grid:
     """Read all ``--vary`` of a command line.
 
     Parameters
@@ -140,7 +140,7 @@ def read_vary(texts: Iterable[str], names: Sequence[str]) -> dict[str, tuple[flo
     InputError
         With every problem found, each with its text and column.
     """
-    varied_values: dict[str, tuple[float, ...]] = {}
+    varied_values: Grid = {}
     problems = []
     for text in texts:
         try:

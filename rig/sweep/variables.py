@@ -9,6 +9,9 @@ from rig.protocol.protocol import Protocol
 from rig.reasons import rig_error
 from rig.text_rows import read_rows
 
+Grid = dict[str, tuple[float, ...]]
+"""Values of each parameter, by its name."""
+
 
 class Variable(NamedTuple):
     """One parameter.
@@ -34,7 +37,7 @@ VARIABLES = {
 """By name; ``variables.txt`` has the name, the key of a protocol that has its range, and these."""
 
 
-def scene_values(protocol: Protocol) -> dict[str, tuple[float, ...]]:
+def scene_values(protocol: Protocol) -> Grid:
     """Return what the striking chain's fall depends on, each with the scene's own value.
 
     Only the incline may have several values, those of the plan. Where the protocol states α, the
@@ -51,7 +54,7 @@ def scene_values(protocol: Protocol) -> dict[str, tuple[float, ...]]:
     if protocol.drag is not None:
         raise rig_error("sweep_in_air", protocol=protocol.source)
     chain = next(iter(protocol.chains.values())).chain
-    stated: dict[str, tuple[float, ...]] = {}
+    stated: Grid = {}
     values: dict[str, float | None] = {}
     if chain.alpha is None:
         stated["incline"] = protocol.plan.inclines
