@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rig.arrays import Array, Flags
-from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
+from rig.model.chain import Chain
 from rig.model.fall import after_impacts
 from rig.model.impact import alpha_level, contact_share, gamma_finite
 from rig.model.surface import Pile
@@ -47,12 +47,12 @@ def given_impacts(alpha: ArrayLike, gamma: ArrayLike = 0.0) -> Impacts:
 def surface_impacts(
     incline_deg: ArrayLike,
     restitution: ArrayLike,
-    friction: ArrayLike = 0.0,
-    inertia: ArrayLike = UNIFORM_ROD_INERTIA,
+    friction: ArrayLike,
+    inertia: ArrayLike,
     *,
-    inertia_z: ArrayLike | None = None,
+    inertia_z: ArrayLike | None,
+    pile: Pile | None,
     gamma: ArrayLike | None = None,
-    pile: Pile | None = None,
 ) -> Impacts:
     """Return coefficients for a surface, Eqs. 8, 10, 12 and 13; all arguments broadcast.
 

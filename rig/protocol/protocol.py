@@ -23,9 +23,7 @@ if TYPE_CHECKING:
 
 Side = Literal["impact", "free"]
 Order = Literal["ABBA", "alternate", "fixed"]
-AT_REST = Quantity(0.0)
 STANDARD_GRAVITY: Quantity = DEFAULTS["gravity"]
-PPS_U: float = DEFAULTS["reference"]
 SIDES: tuple[Side, ...] = ("impact", "free")
 
 
@@ -58,12 +56,12 @@ class RodChain:
     name: str
     chain: Chain
     widths: tuple[float, ...]
-    tilt_deg: float = DEFAULTS["chains.*.tilt"]
-    position_u: float = DEFAULTS["chains.*.position_uncertainty"]
-    width_u: float = DEFAULTS["chains.*.width_uncertainty"]
-    diameters: tuple[float, ...] = ()
-    rod_length: float = 0.0
-    weighed: bool = False
+    tilt_deg: float
+    position_u: float
+    width_u: float
+    diameters: tuple[float, ...]
+    rod_length: float
+    weighed: bool
 
     @property
     def missing_keys(self) -> tuple[str, ...]:
@@ -318,21 +316,21 @@ class Protocol:
     chains: dict[str, RodChain]
     gravity: Quantity
     drop: Quantity
-    surface: Surface | None = None
-    track: InclinedTrack | None = None
-    gates: Gates = field(default_factory=Gates)
-    release: ReleasePulse = field(default_factory=ReleasePulse)
-    plan: Plan = field(default_factory=Plan)
-    accept: Accept = field(default_factory=Accept)
-    initial_speed: Quantity = AT_REST
-    drag: Drag | None = None
-    contact: Contact = field(default_factory=Contact)
-    reference_u: float = PPS_U
-    priors: Priors = field(default_factory=Priors)
-    blind: bool = False
-    notes: str = ""
-    text: str = ""
-    source: str = ""
+    surface: Surface | None
+    track: InclinedTrack | None
+    gates: Gates
+    release: ReleasePulse
+    plan: Plan
+    accept: Accept
+    initial_speed: Quantity
+    drag: Drag | None
+    contact: Contact
+    reference_u: float
+    priors: Priors
+    blind: bool
+    notes: str
+    text: str
+    source: str
     stated: Protocol | None = None
     variants: Mapping[str, Protocol] = field(default_factory=dict)
 
@@ -347,7 +345,7 @@ class Protocol:
     @property
     def thrown(self) -> bool:
         """Whether chains have an initial speed: then drops can only be predicted."""
-        return self.initial_speed != AT_REST
+        return self.initial_speed != Quantity(0.0)
 
     @property
     def vocabulary(self) -> Vocabulary:
