@@ -122,26 +122,18 @@ class ContinuumEnd(Fall):
     evaluations: int
 
 
-def speed(chain: UniformChain, height_m: float) -> float:
-    """Return the speed with the chain's top end at a height, Eq. 14 with any initial speed, m/s.
+def end_speed(chain: UniformChain) -> float:
+    """Return the speed as the chain's top end reaches the surface, Eq. 14 at z = 0, m/s.
 
-    ``V² = V_h² (A/B)^2α + 2gB ((A/B)^(1+2α) − 1)/(1+2α)`` with B = z + γs, written as a sum of
-    positive terms. Above z₀ the chain still falls freely.
-
-    Raises
-    ------
-    ValueError
-        Outside 0 ≤ z ≤ z₀ + h.
+    With any initial speed ``V² = V_h² (A/γs)^2α + 2gγs ((A/γs)^(1+2α) − 1)/(1+2α)``, written as a
+    sum of positive terms; infinite where γs = 0 and α > 0.
     """
-    fallen = chain.length_m - height_m
-    if not -chain.drop_m <= fallen <= chain.length_m:
-        raise ValueError(f"height {height_m:g} m is outside the fall")
-    below = height_m + chain.reach_m
-    if fallen <= 0.0 or below == chain.alpha == 0.0:  # nothing pulls
-        return free_leg(chain.drop_m + fallen, chain.initial_speed, chain.gravity)[0]
-    if below == 0.0:
+    if chain.reach_m == chain.alpha == 0.0:  # nothing pulls
+        way = chain.drop_m + chain.length_m
+        return free_leg(way, chain.initial_speed, chain.gravity)[0]
+    if chain.reach_m == 0.0:
         return math.inf
-    ratio, power = fallen / below, chain.power
+    ratio, power = chain.length_m / chain.reach_m, chain.power
     pulled = chain.pull * math.expm1(-power * math.log1p(ratio)) / power
     try:
         # A power of the ratio itself: its logarithm would be rounded before it is multiplied up.
@@ -151,7 +143,7 @@ def speed(chain: UniformChain, height_m: float) -> float:
     return grown * math.sqrt(chain.strike_speed**2 - pulled)
 
 
-def end(chain: UniformChain, *, nodes: int = 16, panels: int | None = None) -> ContinuumEnd:
+def end(chain: UniformChain, *, nodes: int = 16) -> ContinuumEnd:
     """Return Δz, V and t of a fall by composite Gauss–Legendre quadrature of S15 and S16.
 
     The substitution x = X p (p + q)/(1 + q) makes x + x₀ the square of p + q/2, x₀ being how far
@@ -161,16 +153,13 @@ def end(chain: UniformChain, *, nodes: int = 16, panels: int | None = None) -> C
     Parameters
     ----------
     nodes
-        Nodes in each panel.
-    panels
-        Panels of equal width in p; `None` for full precision with 16 nodes.
+        Nodes in each panel; 16 for full precision.
     """
     span = _FARTHEST  # X, as far as it matters for Δz and t
     if chain.reach_m > 0.0:
         span = min(math.log1p(chain.length_m / chain.reach_m), span)
     square, line = _substitution(chain, span)
-    if panels is None:
-        panels = 1 + math.ceil(math.sqrt(span) + 0.2 * chain.alpha * span)
+    panels = 1 + math.ceil(math.sqrt(span) + 0.2 * chain.alpha * span)
     rule, half = gauss(nodes), 0.5 / panels
     p = half * (2.0 * np.arange(panels)[:, None] + 1.0 + rule.nodes)
     x = span * p * (square * p + line)
@@ -185,7 +174,7 @@ def end(chain: UniformChain, *, nodes: int = 16, panels: int | None = None) -> C
     lay_down = float(np.sum(passing @ rule.weights))
     return ContinuumEnd(
         separation_m=chain.alpha * float(np.sum((gained * passing) @ rule.weights)),
-        speed_m_s=speed(chain, 0.0),
+        speed_m_s=end_speed(chain),
         time_s=free_leg(chain.drop_m, chain.initial_speed, chain.gravity)[1] + lay_down,
         lay_down_s=lay_down,
         evaluations=v.size,

@@ -8,7 +8,7 @@ from operator import mul
 import numpy as np
 
 from rig.model.chain import Chain
-from rig.model.continuum import UniformChain, end, separation_leading_order, speed
+from rig.model.continuum import UniformChain, end, end_speed, separation_leading_order
 from rig.model.fall import Fall, Hit, fall, free_leg, hits, kicks
 from rig.model.impact import Impact, alpha_inclined, alpha_level, impact_on
 from rig.model.surface import Pile, Surface
@@ -110,7 +110,7 @@ def _inertia_row(inertia: float) -> Sequence[float]:
     fall_end = _fall(chain, impact)
     smooth = UniformChain(LENGTH, PITCH, impact.alpha, impact.gamma, DROP, GRAVITY)
     eq15 = separation_leading_order(impact.alpha, LENGTH, smooth.reach_m)
-    return inertia, fall_end.separation_m, fall_end.speed_m_s, eq15, speed(smooth, 0.0)
+    return inertia, fall_end.separation_m, fall_end.speed_m_s, eq15, end_speed(smooth)
 
 
 def claims() -> dict[int | None, dict[str, str]]:

@@ -1,6 +1,5 @@
 """The continuum fall against many digits, and limits with closed forms: Eqs. 15 and S17."""
 
-import math
 from dataclasses import replace
 from decimal import Decimal
 
@@ -11,7 +10,7 @@ from mpmath import mp
 
 from rig.bench.references import continuum, many_digits
 from rig.errors import DomainError
-from rig.model.continuum import UniformChain, end, separation_leading_order, speed
+from rig.model.continuum import UniformChain, end, end_speed, separation_leading_order
 from tests.examples import examples
 from tests.model.chains import ALPHAS, close, decades
 from tests.tables import cases
@@ -46,26 +45,15 @@ def test_agrees_with_the_closed_form(length, reach, alpha, drop, gravity, initia
 
 
 @examples(150)
-@given(
-    decades(-3, 3), decades(-15, 6), ALPHAS, DROPS, GRAVITIES, SPEEDS, st.floats(0.0, 1.0)
-)  # fmt: skip
-def test_speed_is_equation_14(length, reach, alpha, drop, gravity, initial_speed, share):
-    z = share * length
-    found = speed(chain_of(length, reach, alpha, drop, gravity, initial_speed), z)
+@given(decades(-3, 3), decades(-15, 6), ALPHAS, DROPS, GRAVITIES, SPEEDS)
+def test_the_speed_at_the_end_is_equation_14(length, reach, alpha, drop, gravity, initial_speed):
+    found = end_speed(chain_of(length, reach, alpha, drop, gravity, initial_speed))
     with mp.workdps(60):
-        given = (z, length, reach, alpha, drop, gravity, initial_speed)
-        z, z0, r, a, h, g, v = map(mp.mpf, given)
+        z0, r, a, h, g, v = map(mp.mpf, (length, reach, alpha, drop, gravity, initial_speed))
         braces = (h + v * v / (2 * g)) * (z0 + r) ** (2 * a)
-        braces += ((z0 + r) ** (1 + 2 * a) - (z + r) ** (1 + 2 * a)) / (1 + 2 * a)
-        wanted = mp.sqrt(2 * g / (z + r) ** (2 * a) * braces)
+        braces += ((z0 + r) ** (1 + 2 * a) - r ** (1 + 2 * a)) / (1 + 2 * a)
+        wanted = mp.sqrt(2 * g / r ** (2 * a) * braces)
     assert close(found, float(wanted), 1e-14)
-
-
-def test_above_the_surface_the_chain_falls_freely():
-    chain = chain_of(2.0, 0.1, 0.3, 8.0, 9.0, 5.0)
-    assert speed(chain, 10.0) == 5.0
-    assert speed(chain, 7.0) == math.sqrt(25.0 + 2 * 9.0 * 3.0)
-    assert speed(chain, 2.0) == chain.strike_speed == 13.0
 
 
 @cases
