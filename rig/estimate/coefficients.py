@@ -1,9 +1,7 @@
 """β, μ and the pile's β by least squares on the edges, where these can tell them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 from rig.estimate.hypotheses import by_model, given_alphas, with_nuisances
 from rig.estimate.hypothesis_fit import HypothesisFit, Parameter, fit
@@ -56,7 +54,7 @@ class CoefficientProblem(NamedTuple):
         """Inclines that the model describes, ascending."""
         return sorted({form.run.incline_deg for form in self.forms})
 
-    def hold(self, held: Mapping[str, float]) -> CoefficientProblem:
+    def hold(self, held: Mapping[str, float]) -> Self:
         """Hold coefficients within these uncertainties; one that is exact leaves the fit."""
         stated = {name: q for name, q in self.stated.items() if held.get(name) != 0.0}
         return self._replace(stated=stated, held=tuple(name for name in held if name in stated))

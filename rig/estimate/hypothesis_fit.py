@@ -1,10 +1,8 @@
 """All drops of a session under one hypothesis about their impacts: generalised least squares."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -78,6 +76,30 @@ class Hypothesis(NamedTuple):
         return target, slopes
 
 
+class LikelihoodRatio(NamedTuple):
+    """A likelihood-ratio test.
+
+    Attributes
+    ----------
+    chi2
+        By how much χ² is larger for the narrower hypothesis.
+    degrees
+        How many parameters it has less.
+    """
+
+    chi2: float
+    degrees: int
+
+    @property
+    def p(self) -> float | None:
+        """How often chance alone would make χ² as large; `None` without degrees of freedom."""
+        return chi2_tail(self.chi2, self.degrees) if self.degrees > 0 else None
+
+    def json(self) -> dict[str, Any]:
+        """``{"chi2", "degrees", "p"}``."""
+        return attributes(self, "chi2", "degrees", "p")
+
+
 @dataclass(frozen=True, slots=True)
 class HypothesisFit:
     """A hypothesis where it fits best.
@@ -106,34 +128,10 @@ class HypothesisFit:
         n = self.names.index(name)
         return Measured(float(self.values[n]), float(np.sqrt(self.covariance[n, n])))
 
-    def against(self, wider: HypothesisFit) -> LikelihoodRatio:
+    def against(self, wider: Self) -> LikelihoodRatio:
         """Test it against a hypothesis in which it is contained; rounding makes no χ² negative."""
         degrees = len(wider.names) - len(self.names)
         return LikelihoodRatio(max(0.0, self.chi2 - wider.chi2), degrees)
-
-
-class LikelihoodRatio(NamedTuple):
-    """A likelihood-ratio test.
-
-    Attributes
-    ----------
-    chi2
-        By how much χ² is larger for the narrower hypothesis.
-    degrees
-        How many parameters it has less.
-    """
-
-    chi2: float
-    degrees: int
-
-    @property
-    def p(self) -> float | None:
-        """How often chance alone would make χ² as large; `None` without degrees of freedom."""
-        return chi2_tail(self.chi2, self.degrees) if self.degrees > 0 else None
-
-    def json(self) -> dict[str, Any]:
-        """``{"chi2", "degrees", "p"}``."""
-        return attributes(self, "chi2", "degrees", "p")
 
 
 def fit(forms: Sequence[QuadraticForm], hypothesis: Hypothesis) -> HypothesisFit:

@@ -1,11 +1,9 @@
 """A protocol file from a few answers, with comments, and gates at suitable heights."""
 
-from __future__ import annotations
-
 import json
 from itertools import count, pairwise
 from string import Template
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple, Self, get_args
 
 from rig.errors import InputError
 from rig.protocol.keys import KEYS
@@ -50,7 +48,7 @@ class Draft(NamedTuple):
     inclines: str
     repeats: int
 
-    def trial(self) -> Draft:
+    def trial(self) -> Self:
         """Return the draft with four drops, at the middle incline."""
         inclines = self.inclines.strip(" ,").split(",")
         return self._replace(inclines=inclines[len(inclines) // 2].strip(), repeats=4)
