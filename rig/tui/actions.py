@@ -3,8 +3,6 @@
 Keys are bound only here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from itertools import groupby
 from operator import attrgetter
@@ -58,6 +56,8 @@ def _action(cells: Iterable[str]) -> Action:
 
 ACTIONS = tuple(map(_action, read_rows(__file__)))
 BY_NAME = {action.name: action for action in ACTIONS}
+PAGES = read_rows(__file__, "pages.txt")
+"""Pages in the order of their tabs: name, module, stages and keys, see the table."""
 NEEDS_RIG = {"stop", "control", "wave"}
 """Actions that need a rig but no control."""
 _SIGNS = "question_mark=? minus=− plus=+ full_stop=. left=← right=→ up=↑ down=↓ enter=Enter tab=Tab"

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable, Coroutine, Hashable, Iterator, Mapping, Sequence
 from importlib import import_module
 from time import monotonic, process_time
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from textual import events
 from textual.app import App, ComposeResult
 from textual.css.query import NoMatches
+from textual.filter import LineFilter
 from textual.theme import Theme
 from textual.widgets import Input
 
 from rig.campaign import machine as campaign
 from rig.campaign.machine import BEFORE_RELEASE, Flow, Stage
 from rig.errors import RigError
+from rig.text_rows import read_rows
 from rig.tui import commands
-from rig.tui.actions import BY_NAME, NEEDS_RIG, Action, possible
+from rig.tui.actions import BY_NAME, NEEDS_RIG, PAGES, Action, possible
 from rig.tui.ascii import AsciiFilter
 from rig.tui.client import ReconnectingClient
-from rig.tui.desk import Desk
+from rig.tui.context import Options
+from rig.tui.desk import Desk, Face
 from rig.tui.driver import Driver
 from rig.tui.follow import Follower
 from rig.tui.model import Model
@@ -30,14 +34,6 @@ from rig.tui.widgets.bars import StatusBar, StopBar, StopLine
 from rig.tui.widgets.dialogs import Ask, Confirm, Dialog
 from rig.tui.widgets.page import Page
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Hashable, Iterator, Mapping, Sequence
-
-    from textual.filter import LineFilter
-
-    from rig.tui.context import Options
-    from rig.tui.desk import Face
-
 TICK_S = 0.1
 _LEAST_S = 0.01  # least time between ticks, after a late tick
 _LOOK_S = 2.0  # time between two scans of folder and USB
@@ -46,47 +42,17 @@ _COUNTED_S = 0.3
 _TOLD_S = 15.0
 _SHARE = 0.18  # share of a core that the app may use for long
 _SAVED_S = 0.1  # processor time that a fall may use beyond that
-_PAGE_OF = {
-    Stage.PROTOCOL: "protocol",
-    Stage.DEVICE: "device",
-    Stage.RESULT: "result",
-    Stage.HALTED: "result",
-    Stage.DONE: "session",
-}
-
-
+_PAGE_OF = {stage: page for page, _, stages, _ in PAGES for stage in stages.split()}
 _HEIGHTS = [(0, "-low"), (30, "-high")]
 """Classes of a screen by its least number of lines."""
-_PAGES = {
-    "home": "protocol",
-    "device": "device",
-    "drop": "run result history",
-    "session": "session",
-}
-"""Pages by the module that draws them."""
 _WATCHING = "this screen only watches\npress c to take control when it is free"
 _NOT_MEANT = (
     "not armed: Enter came too soon after another key\nwait half a second, then press Enter once"
 )
 
-_COLOURS = """\
-            dark    light   contrast
-primary    #5aa9e6 #0b5cad #00ffff
-secondary  #f2a65a #a8480c #ffff00
-accent     #c3a6ff #6a3fb5 #ffffff
-success    #6fcf97 #1b6e3c #00ff00
-warning    #f2c94c #7a5900 #ffff00
-error      #ff6b6b #b3161d #ff9d9d
-foreground #dfe6ee #1b232c #ffffff
-background #10151c #fbfaf7 #000000
-surface    #161d27 #f3f1ec #000000
-panel      #1e2733 #e6e3dc #000000
-border     #33465c #9aa5b1 #ffffff
-"""
-
 
 def _themes() -> Iterator[Theme]:
-    names, *rows = (row.split() for row in _COLOURS.splitlines())
+    (_, *names), *rows = read_rows(__file__, "themes.txt", None)
     for at, name in enumerate(names):
         colours: dict[str, Any] = {part: values[at] for part, *values in rows}
         border = colours.pop("border")
@@ -305,9 +271,9 @@ class RigApp(App[None], inherit_bindings=False):
 
     async def _load_pages(self) -> None:
         """Load modules that were not needed for the first paint."""
-        for module, pages in _PAGES.items():
+        for page, module, *_ in PAGES:
             loaded = await asyncio.to_thread(import_module, f"rig.tui.pages.{module}")
-            self._faces |= dict.fromkeys(pages.split(), loaded.face)
+            self._faces[page] = loaded.face
             self.draw()
         await asyncio.to_thread(import_module, "rig.results.live")
         if self._loaded is not None:

@@ -1,17 +1,12 @@
 """Conversion of drawn text to ASCII, for terminals and fonts without Unicode."""
 
-from __future__ import annotations
-
 import unicodedata
-from typing import TYPE_CHECKING
 
 from rich.segment import Segment
+from textual.color import Color
 from textual.filter import LineFilter
 
 from rig.tui.braille import ROWS, dots_of
-
-if TYPE_CHECKING:
-    from textual.color import Color
 
 _LIKE = str.maketrans(
     "✓✗⊘…·↓■●○◌▲▸▶◀‖→←↑☞━─╌│┤├┴└┃┏┓┗┛Δαβγκμσνχ±−–°×²³ₙ≤≥½",

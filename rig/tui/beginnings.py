@@ -1,19 +1,14 @@
 """Rows of the home page: what the operator may begin with."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, NamedTuple
+from pathlib import Path
+from typing import NamedTuple
 
 from rig.errors import InputError
 from rig.protocol import reader
 from rig.protocol.measurable import check_recordable
+from rig.protocol.protocol import Protocol
+from rig.tui.context import Options
 from rig.tui.widgets.text import plain
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from rig.protocol.protocol import Protocol
-    from rig.tui.context import Options
 
 HERE = "Experiments here"
 

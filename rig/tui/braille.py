@@ -1,7 +1,5 @@
 """Drawing in braille: a character has 2 × 4 dots of the same colour."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import groupby

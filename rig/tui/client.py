@@ -1,7 +1,5 @@
 """Connection to the daemon, which is found or started, and reconnected when lost."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import subprocess

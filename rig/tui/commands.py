@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from rig.analysis.result import GOOD
 from rig.campaign.machine import Again, GoOn, Note, Notice, Reject, Restore, Stage, StopRequest, Try
 from rig.reasons import notes_in
+from rig.text_rows import read_rows
 from rig.tui.actions import ACTIONS, help_text, shown_key
 from rig.tui.follow import open_live
 from rig.tui.replay import Player
@@ -34,13 +35,8 @@ if TYPE_CHECKING:
     Work = Coroutine[Any, Any, object] | None
     """What an action leaves to do in the background."""
 
-REASONS = (
-    "touched, or not at rest, before the release",
-    "not set up as the run page shows",
-    "a knock or a draught at the rig",
-    "caught on something",
-    "a trial that should not count",
-)
+_QUESTIONS = {name: texts for name, *texts in read_rows(__file__, "questions.txt")}
+REASONS = [reason for (reason,) in read_rows(__file__, "rejections.txt")]
 """Frequent reasons to reject a drop within its limits; the operator may type another."""
 _ONLY_ENTER = "only the Enter key arms the release\npress it half a second after any other key"
 
@@ -111,7 +107,7 @@ def _connect(app: RigApp, row: Beginning) -> None:
 
 def _flash(app: RigApp, row: Beginning) -> None:
     flash = partial(_run, app, "flash", "--board", row.value)
-    _confirm(app, "Write the firmware?", "What was on the board is replaced.", "flash", flash)
+    _confirm(app, "flash", flash)
 
 
 def _new(app: RigApp, row: Beginning) -> Work:
@@ -134,8 +130,7 @@ def _end_other(app: RigApp, row: Beginning) -> None:
             os.kill(process, signal.SIGTERM)
 
     del row
-    question = f"The daemon of {plain(port, 40)} ends. What it has recorded stays in its file."
-    _confirm(app, "End it?", question, "end it", end)
+    _confirm(app, "end", end, port=plain(port, 40))
 
 
 _BEGIN: dict[str, Callable[[RigApp, Beginning], Work]] = {
@@ -154,8 +149,7 @@ def _control(app: RigApp) -> Work:
     client = app.client
     if not client.driving:
         return client.take_control()
-    question = "Another screen can then take it; this screen keeps watching."
-    _confirm(app, "Give control back?", question, "give it back", client.release_control)
+    _confirm(app, "control", client.release_control)
     return None
 
 
@@ -166,19 +160,18 @@ def _close(app: RigApp) -> None:
         app.driver.asked = None
         return _ask(app, "close_session")
 
-    question = "Everything recorded stays in its file. You can continue it later."
-    _confirm(app, "Close the session?", question, "close", close)
+    _confirm(app, "close", close)
 
 
 def _quit(app: RigApp) -> None:
     """Ask, then quit."""
-    question = "" if app.options.offline else "The rig keeps running after you quit."
-    if app.client.is_trial:
-        question = "The simulation ends too. What it has recorded stays in its file."
-    _confirm(app, "Quit?", question, "quit", app.exit)
+    kind = " trial" if app.client.is_trial else " offline" if app.options.offline else ""
+    _confirm(app, f"quit{kind}", app.exit)
 
 
-def _confirm(app: RigApp, title: str, question: str, yes: str, act: Callable[[], Work]) -> None:
+def _confirm(app: RigApp, name: str, act: Callable[[], Work], **values: object) -> None:
+    """Ask a question of the table, then act."""
+    title, question, yes = (text.format(**values) for text in _QUESTIONS[name])
     app.ask(Confirm(title, question, yes), lambda _: act())
 
 
@@ -193,12 +186,8 @@ def _try_release(app: RigApp) -> None:
     view = app.model.view
     if view is None:
         return
-    pulse_ms = view.protocol.release.pulse * 1e3
-    question = (
-        f"This drives the release once, for {pulse_ms:g} ms. Take {view.protocol.vocabulary.body} "
-        "off first. The test is not a run of the plan and is not counted."
-    )
-    _confirm(app, "Test the release?", question, "test", lambda: app.driver.take(Try()))
+    values = {"pulse_ms": view.protocol.release.pulse * 1e3, "body": view.protocol.vocabulary.body}
+    _confirm(app, "release_test", lambda: app.driver.take(Try()), **values)
 
 
 def _note(app: RigApp) -> None:
@@ -265,7 +254,7 @@ def _write(app: RigApp, command: str, option: str, suffix: str) -> None:
         return
     target = view.path.with_suffix(suffix)
     write = partial(_run, app, command, view.path, option, target)
-    _confirm(app, "Write files?", f"{target} will be replaced if it exists.", "write", write)
+    _confirm(app, "write", write, target=target)
 
 
 async def _run(app: RigApp, *command: str | Path, done: str = "") -> None:
@@ -294,8 +283,7 @@ def _reject(app: RigApp) -> None:
     model = app.model
     if model.flow.verdict == "rejected":
         verdict, _ = model.flow.judged
-        question = f"The drop becomes {verdict} again. The log keeps both verdicts."
-        _confirm(app, "Undo the rejection?", question, "undo", lambda: app.driver.take(Restore()))
+        _confirm(app, "undo", lambda: app.driver.take(Restore()), verdict=verdict)
         return
 
     question = "Why is this drop rejected?"
@@ -313,11 +301,9 @@ def _repeat(app: RigApp) -> None:
     job = model.flow.job or model.job
     next_run = model.again(job.run) if job else None
     if next_run is not None:
-        title = f"Repeat run {next_run.run} (attempt {next_run.attempt})?"
-        question = "This only prepares the run; nothing is armed yet."
-        if any(line.run == next_run.run and line.state in GOOD for line in model.runs):
-            question += " The run has a good drop; the new attempt will count instead."
-        _confirm(app, title, question, "prepare", lambda: app.driver.take(Again(next_run)))
+        good = any(line.run == next_run.run and line.state in GOOD for line in model.runs)
+        again = partial(app.driver.take, Again(next_run))
+        _confirm(app, "repeat good" if good else "repeat", again, job=next_run)
 
 
 def _unblind(app: RigApp) -> None:
@@ -325,8 +311,7 @@ def _unblind(app: RigApp) -> None:
     if not app.model.blind:
         app.driver.take(Notice("this session is not blind\nwrite blind: true in its protocol"))
         return
-    question = "This shows all results. It is recorded and cannot be undone."
-    _confirm(app, "Unblind the session?", question, "show results", lambda: _ask(app, "unblind"))
+    _confirm(app, "unblind", lambda: _ask(app, "unblind"))
 
 
 def _begin_check(app: RigApp) -> None:

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from textual.content import Content
 
-from rig.tui.beginnings import HERE, first_row, read_file
+from rig.records import Job
+from rig.tui.beginnings import HERE, Beginning, ProtocolFile, first_row, read_file
+from rig.tui.context import Options
+from rig.tui.model import Model
 from rig.tui.replay import Player, end_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from pathlib import Path
-
-    from rig.records import Job
     from rig.results.live import SessionView
-    from rig.tui.beginnings import Beginning, ProtocolFile
-    from rig.tui.context import Options
-    from rig.tui.model import Model
     from rig.tui.plotting import Picture
     from rig.tui.scale import Drawing
 

@@ -1,7 +1,5 @@
 """Asynchronous driver of a campaign, which carries out effects in the background."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Coroutine
 from time import monotonic
 from typing import Any

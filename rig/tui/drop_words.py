@@ -8,27 +8,18 @@ from typing import TYPE_CHECKING
 from rig.measurands import SEPARATION, averaged
 from rig.predictions import predicted_run
 from rig.printable import one_line
+from rig.records import Job
 from rig.report.numbers import plus_minus
 from rig.report.parts import tables
+from rig.text_rows import read_rows
 from rig.text_table import text_table
 
 if TYPE_CHECKING:
     from rig.protocol.protocol import Protocol, Run
-    from rig.records import Job
     from rig.results.live import SessionView
 
-
-LOOKS = {
-    "accepted": ("✓", "$success"),
-    "marginal": ("~", "$warning"),
-    "void": ("✗", "$error"),
-    "rejected": ("⊘", "$error"),
-    "recorded": ("…", "$primary"),
-    "armed": ("!", "$warning"),
-    "fired": ("↓", "$primary"),
-    "interrupted": ("■", "$warning"),
-    "planned": ("·", "$foreground 70%"),
-}
+LOOKS = {name: (sign, colour) for name, sign, colour in read_rows(__file__)}
+"""Sign and colour of each verdict and state of a drop."""
 _PAST = 6
 """Number of drops in the strip of past runs, to fit 80 columns."""
 

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable, Coroutine, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rig.campaign import machine as campaign
-from rig.campaign.machine import BEFORE_RELEASE, Stage
+from rig.campaign.machine import BEFORE_RELEASE, Event, Stage
 from rig.campaign.plan import job_to_judge
 from rig.campaign.voids import Voids, voids_of
 from rig.errors import RigError
 from rig.records import Job
+from rig.tui.client import ReconnectingClient
 from rig.tui.indicators import Indicators
 from rig.tui.state import DaemonState, state_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Coroutine, Iterator, Mapping
-
-    from rig.campaign.machine import Event
     from rig.results.live import LiveAnalysis, SessionView
-    from rig.tui.client import ReconnectingClient
 
 _UNHEARD = (
     "the daemon was lost before the release: nothing fell\n"

@@ -1,7 +1,5 @@
 """The operator's own keys, from a small file with lines such as ``reject = "r"``."""
 
-from __future__ import annotations
-
 import os
 import re
 import tomllib

@@ -7,20 +7,18 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from rig.analysis.result import GOOD
 from rig.campaign import plan
-from rig.campaign.machine import BEFORE_RELEASE, Stage
+from rig.campaign.machine import BEFORE_RELEASE, Flow, Stage
 from rig.campaign.voids import Voids
+from rig.protocol.protocol import Protocol, Run
+from rig.reasons import Reason
+from rig.recorder.run_lines import RunLine
 from rig.records import Job
-from rig.vocabulary import ANY_SCENE
+from rig.tui.indicators import Indicators
+from rig.tui.state import DaemonState
+from rig.vocabulary import ANY_SCENE, Vocabulary
 
 if TYPE_CHECKING:
-    from rig.campaign.machine import Flow
-    from rig.protocol.protocol import Protocol, Run
-    from rig.reasons import Reason
-    from rig.recorder.run_lines import RunLine
     from rig.results.live import SessionView
-    from rig.tui.indicators import Indicators
-    from rig.tui.state import DaemonState
-    from rig.vocabulary import Vocabulary
 
 SLOW_DISK_S = 0.5
 """Duration of a disk write that is a problem, s: normal writes take milliseconds, and messages of

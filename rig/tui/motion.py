@@ -1,7 +1,5 @@
 """Motion of chains and objects during a drop, from its edges and by the model."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction

@@ -1,10 +1,9 @@
 """The next step: a common source for the page's coloured line, the footer, and Enter."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from rig.campaign.machine import Stage
+from rig.text_rows import read_rows
 from rig.tui.model import Model
 from rig.tui.widgets.gates import label
 from rig.tui.widgets.text import duration, plain
@@ -15,28 +14,12 @@ class NextStep(NamedTuple):
 
     enter: str
     text: str
-    color: str = "$primary"
+    color: str
 
 
 _HANDS = {"holding": "Hold", "placing": "Place", "hanging": "Hang"}
-_PASSING = {
-    Stage.TESTING: "Testing the release; any key stops.",
-    Stage.ARMING: "Arming …; any key stops.",
-    Stage.FIRING: "Releasing …",
-    Stage.JUDGING: "Reading and analysing the drop …",
-}
-
-
-_ONWARD = {
-    Stage.PREPARE: ("to the run", "Enter goes to the run."),
-    Stage.RESULT: ("next run", "Enter prepares the next run."),
-    Stage.DONE: ("next run", "Enter prepares the next run."),
-    Stage.HALTED: ("try again", "Mend the cause, then Enter prepares the run again."),
-    Stage.DEVICE: (
-        "to the first run",
-        "Wave a hand through each beam. Enter goes to the first run.",
-    ),
-}
+_PASSING = (Stage.SETTLING, Stage.LIVE, Stage.TESTING, Stage.ARMING, Stage.FIRING, Stage.JUDGING)
+_STEPS = {situation: NextStep(*cells) for situation, *cells in read_rows(__file__)}
 
 
 def hand(model: Model) -> str:
@@ -51,56 +34,57 @@ def at_rest(model: Model) -> str:
 
 def next_step(model: Model) -> NextStep:
     """Return the next step for the present stage and page."""
-    stage, left = model.stage, model.next_job is not None
-    if model.offline:
-        return NextStep("", "")
-    if stage is Stage.COUNTDOWN:
-        left_s = f"ARMED: release in {max(0.0, model.flow.left_s):.1f} s. Any key stops."
-        other = "ARMED by another client. Keep clear."
-        return NextStep("", left_s if model.driving else other, "$warning")
-    if stage is Stage.SETTLING:
-        wait = f"Waiting: let everything {at_rest(model)} …; any key stops."
-        return NextStep("", wait, "$warning")
-    if stage is Stage.LIVE:
-        return NextStep("", f"FALLING  {len(model.state.edges)} edges so far")
-    if stage in _PASSING:
-        return NextStep("", _PASSING[stage], "$warning")
-    if not model.driving and model.connected and stage is not Stage.PROTOCOL:
-        return NextStep("", "Watching. Press c to take control when it is free.")
-    if stage is Stage.PREPARE and model.page == "run":
-        return _prepare(model)
-    if stage is Stage.RESULT and not model.flow.logged:  # what comes next depends on it
-        return NextStep("after the verdict is saved", "Saving the verdict …")
-    if stage is Stage.PROTOCOL:
-        return NextStep("open" if model.page == "protocol" else "home", "No session is open.")
-    if stage in {Stage.RESULT, Stage.DONE} and not left:
-        return NextStep("end" * (stage is Stage.RESULT), "All runs of the plan are complete.")
-    return NextStep(*_ONWARD[stage])
-
-
-def _prepare(model: Model) -> NextStep:
-    """Return the next preparation; the device refuses to arm before all are done."""
-    indicators = model.indicators
-    if not model.connected or model.state.link != "up":
-        return NextStep("arm", "The device is not connected; Enter arms when it is.", "$warning")
-    if not indicators.known:
-        return NextStep("arm", "Waiting for the gates; Enter arms when they answer.", "$warning")
-    if indicators.blocked_channels:
-        first, *more = indicators.blocked_channels
-        blocked = f"Clear the beam of {label(model, first)}{f' and {len(more)} more' * bool(more)}"
-        return NextStep("arm", f"{blocked}; Enter arms when it is clear.", "$warning")
-    if indicators.restless(model.now_s):
-        moving = f"A beam keeps changing. Let everything {at_rest(model)}, then Enter arms."
-        return NextStep("arm", moving, "$warning")
-    run = model.run
-    body = model.words.body
-    if run is not None and run.impact is not None:
-        beside = f" on the impact side, {plain(run.free, 20)} on the free side" * bool(run.free)
-        body = f"{plain(run.impact, 20)}{beside}, board at {plain(run.set_up, 40)}"
-    settle = duration(model.settle_s)
-    return NextStep(
-        "arm",
-        f"{hand(model)} {body}; hands away. "
-        f"Enter arms: {settle} of rest, 3 s of countdown, release.",
-        "$success",
+    step = _STEPS[_situation(model)]
+    text = step.text.format(
+        left_s=max(0.0, model.flow.left_s),
+        edges=len(model.state.edges),
+        rest=at_rest(model),
+        beams=_blocked_beams(model),
+        hand=hand(model),
+        setup=_setup(model),
+        settle=duration(model.settle_s),
     )
+    return step._replace(text=text)
+
+
+def _situation(model: Model) -> str:
+    """Name the situation; the device refuses to arm before all preparations are done."""
+    stage, indicators = model.stage, model.indicators
+    if model.offline:
+        return "offline"
+    if stage is Stage.COUNTDOWN:
+        return stage if model.driving else "countdown elsewhere"
+    if stage in _PASSING:
+        return stage
+    if stage is Stage.PROTOCOL:
+        return stage if model.page == "protocol" else "protocol elsewhere"
+    if not model.driving and model.connected:
+        return "watching"
+    if stage is Stage.RESULT and not model.flow.logged:  # what comes next depends on it
+        return "unsaved"
+    if stage in {Stage.RESULT, Stage.DONE} and model.next_job is None:
+        return f"{stage} last"
+    if stage is not Stage.PREPARE or model.page != "run":
+        return stage
+    if not model.connected or model.state.link != "up":
+        return "no device"
+    if not indicators.known:
+        return "no gates"
+    if indicators.blocked_channels:
+        return "blocked"
+    return "moving" if indicators.restless(model.now_s) else "ready"
+
+
+def _blocked_beams(model: Model) -> str:
+    channels = model.indicators.blocked_channels
+    more = f" and {len(channels) - 1} more" * (len(channels) > 1)
+    return f"{label(model, channels[0])}{more}" if channels else ""
+
+
+def _setup(model: Model) -> str:
+    """Return what is set up before a run, in the scene's words."""
+    run = model.run
+    if run is None or run.impact is None:
+        return model.words.body
+    beside = f" on the impact side, {plain(run.free, 20)} on the free side" * bool(run.free)
+    return f"{plain(run.impact, 20)}{beside}, board at {plain(run.set_up, 40)}"

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from rig.records import Job
 from rig.report.falls import fall_figures
-from rig.report.figure import Panel, PlotAxis, Trace
+from rig.report.figure import Chart, Panel, PlotAxis, Trace
 from rig.report.figures import result_figure, runs_figure
 from rig.report.looks import MODEL, SECOND
+from rig.tui.motion import ChainFall
 from rig.tui.plotting import Picture
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from rig.records import Job
-    from rig.report.figure import Chart
     from rig.results.live import SessionView
-    from rig.tui.motion import ChainFall
 
 
 def pictures_of(*charts: Chart | None) -> list[Picture]:

@@ -9,17 +9,16 @@ A frame of 440 points, 120 by 34, takes 5 ms; textual-plot 0.10 takes 16 ms, and
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.report.looks import MODEL, MUTED, SECOND
 from rig.tui.braille import COLUMNS, ROWS, Sheet, Span
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from rig.arrays import Array
     from rig.report.figure import Panel, Trace
 
     Numbers = Sequence[float] | Array

@@ -6,19 +6,18 @@ The drawing consists of strokes in metres. Heights are above the contact point.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from rig.protocol.contact import of_run
+from rig.protocol.protocol import Protocol, RodChain, Run
 from rig.tui.braille import COLUMNS, ROWS, Sheet, Span
+from rig.tui.indicators import Indicators
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from rig.protocol.protocol import Protocol, RodChain, Run
-    from rig.tui.indicators import Indicators
     from rig.tui.motion import ChainFall
 
 _WIDTH_M = 0.1  # length of a rod without a stated length

@@ -5,6 +5,7 @@ See rig/daemon/API.md for the sections; `rig.daemon.replica` applies the changes
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -12,8 +13,6 @@ from typing import TYPE_CHECKING, Any
 from rig.recorder.run_lines import RunLine, plan_lines, read_line
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from rig.results.live import SessionView
 
 EMPTY: Mapping[str, Any] = MappingProxyType({})

@@ -1,7 +1,5 @@
 """Check that the screen was still long enough for a key to be meant for its content."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable
 from time import monotonic
 

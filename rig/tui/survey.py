@@ -3,12 +3,11 @@
 It needs more of the program than the first paint, so it is loaded when a survey is made.
 """
 
-from __future__ import annotations
-
+from collections.abc import Iterator
 from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from rig.errors import RigError
 from rig.files import file_stamp
@@ -17,26 +16,13 @@ from rig.protocol.plan import runs
 from rig.ready import ready_protocols
 from rig.results.whole import protocol_of
 from rig.session.store import Session
+from rig.text_rows import read_rows
 from rig.tui.beginnings import HERE, Beginning
+from rig.tui.context import Options
 from rig.usb.listing import serial_ports
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from rig.tui.context import Options
 
 _MOST = 200
 """Number of session files listed, the newest first."""
-_SCENES = """\
-Try it         | try | falling-ball     |              | a ball: g within seconds
-Try it         | try | inclined-uniform |              | two chains on a board
-New experiment | new | falling-ball     | object       | an object past gates
-New experiment | new | glider           | track        | a glider on a track
-New experiment | new | picket-fence     | picket-fence | a picket fence
-New experiment | new | single-chain     | one-chain    | one chain on a board
-New experiment | new | inclined-uniform | two-chains   | two chains, one strikes
-"""
-"""Section, action, ready protocol for the picture, scene for `rig new`, and title of each row."""
 
 
 class SessionEntry(NamedTuple):
@@ -77,8 +63,7 @@ def look_around(options: Options, port: str, other: str) -> list[Beginning]:
     named = {path.name: path for path in ready + files}
     scenes = [
         Beginning(section, kind, title, named.get(f"{name}.yaml"), value)
-        for row in _SCENES.splitlines()
-        for section, kind, name, value, title in [map(str.strip, row.split("|"))]
+        for section, kind, name, value, title in read_rows(__file__)
     ]
     boards = [*_boards()]
     if other:

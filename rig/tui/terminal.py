@@ -1,7 +1,5 @@
 """Terminal driver that keeps a single reader of keys across stops of the program."""
 
-from __future__ import annotations
-
 import asyncio
 
 from textual.drivers.linux_driver import LinuxDriver

@@ -1,7 +1,5 @@
 """State of the rig: connection, firmware, clock, and a line for every gate."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 
 from textual.content import Content

@@ -2,35 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from textual.content import Content
 
 from rig.analysis.result import GOOD
 from rig.campaign.machine import Stage
-from rig.reasons import notes_in, remedies
-from rig.tui.desk import Face
+from rig.protocol.protocol import Run
+from rig.reasons import Reason, notes_in, remedies
+from rig.records import Job
+from rig.tui.desk import Desk, Face
 from rig.tui.drop_words import LOOKS, expected_words, headline, number_table, past_runs, sentence
-from rig.tui.motion import motions
+from rig.tui.model import Model
+from rig.tui.motion import ChainFall, motions
 from rig.tui.next_step import hand, next_step
 from rig.tui.plots import drop_pictures, fall_pictures
-from rig.tui.replay import indicators_at, until
-from rig.tui.scale import drawing
+from rig.tui.replay import Player, indicators_at, until
+from rig.tui.scale import Drawing, drawing
 from rig.tui.widgets.gates import board
 from rig.tui.widgets.text import plain
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rig.protocol.protocol import Run
-    from rig.reasons import Reason
-    from rig.records import Job
     from rig.results.live import SessionView
-    from rig.tui.desk import Desk
-    from rig.tui.model import Model
-    from rig.tui.motion import ChainFall
-    from rig.tui.replay import Player
-    from rig.tui.scale import Drawing
 
 _DONE = dict.fromkeys((Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING, Stage.LIVE), 3)
 _DONE |= {Stage.SETTLING: 2, Stage.JUDGING: 4, Stage.RESULT: 5, Stage.HALTED: 5}

@@ -1,9 +1,6 @@
 """Home: try it, connect a board, continue, begin something new, or look at results."""
 
-from __future__ import annotations
-
 from itertools import groupby
-from typing import TYPE_CHECKING
 
 from textual.content import Content
 
@@ -11,31 +8,18 @@ from rig.campaign.machine import Stage
 from rig.predictions import notes
 from rig.protocol.describe import describe
 from rig.protocol.plan import runs
-from rig.tui.desk import Face
+from rig.protocol.protocol import Protocol
+from rig.text_rows import read_paragraphs
+from rig.tui.beginnings import Beginning
+from rig.tui.desk import Desk, Face
 from rig.tui.indicators import Indicators
+from rig.tui.model import Model
 from rig.tui.motion import motions
-from rig.tui.scale import drawing
+from rig.tui.scale import Drawing, drawing
 from rig.tui.widgets.text import link_action, plain
 
-if TYPE_CHECKING:
-    from rig.protocol.protocol import Protocol
-    from rig.tui.beginnings import Beginning
-    from rig.tui.desk import Desk
-    from rig.tui.model import Model
-    from rig.tui.scale import Drawing
-
 _FALLEN = 0.7  # share of the fall shown in small pictures
-_DOES = {
-    "try": "Enter simulates it, with no board.\n",
-    "board": "Plug the board in by USB; then choose it here with Enter. Then choose an\n"
-    "experiment: its first page checks each gate with a wave of the hand.",
-    "flash": "Enter puts the firmware on it. A Pico waits for that when its BOOTSEL button was\n"
-    "held while it was plugged in.",
-    "new": "Enter writes its protocol into this folder, with four simulated drops;\n"
-    "then change what differs in your rig. It is like this:\n",
-    "results": "Enter lists the sessions of this folder.",
-    "end": "Enter ends that daemon, so that yours can begin.",
-}
+_DOES = {kind: "\n".join(lines) for kind, *lines in read_paragraphs(__file__)}
 
 
 def face(model: Model, desk: Desk, width: int) -> Face:
@@ -55,14 +39,14 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     elif protocol is not None:
         parts.append(_description(desk, protocol))
         picture = _picture(desk, protocol)
-    return Face(Content(""), picture, words=Content("\n").join(parts), menu=_menu(desk), top=True)
+    return Face(Content(""), picture, words=Content("\n\n").join(parts), menu=_menu(desk), top=True)
 
 
 def _into(model: Model, desk: Desk, row: Beginning) -> str:
     """Return the rig and session file of an experiment in words."""
     session = plain(row.session or desk.options.session or "")
     rig = model.port or "a simulation: no board is connected"
-    return f"→ Enter opens it with {rig}\n→ session file: {session or 'a new one'}\n"
+    return f"→ Enter opens it with {rig}\n→ session file: {session or 'a new one'}"
 
 
 def _menu(desk: Desk) -> Content:

@@ -1,26 +1,19 @@
 """The session so far: the plan with its states, results against incline, the control chart."""
 
-from __future__ import annotations
-
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from textual.content import Content
 
 from rig.analysis.joint_fit import FEWEST
 from rig.campaign.plan import done
+from rig.report.columns import Part
 from rig.report.parts import means_parts, scatter_parts, tables
-from rig.tui.desk import Face
+from rig.tui.desk import Desk, Face
 from rig.tui.drop_words import LOOKS
+from rig.tui.model import Model
 from rig.tui.plots import session_pictures
 from rig.tui.widgets.text import duration, plain
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from rig.report.columns import Part
-    from rig.tui.desk import Desk
-    from rig.tui.model import Model
 
 
 def face(model: Model, desk: Desk, width: int) -> Face:

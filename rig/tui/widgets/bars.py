@@ -1,30 +1,21 @@
 """Top and bottom bars of every screen: title, problems, possible keys, and STOP."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 from textual.app import ComposeResult
 from textual.containers import Vertical
 from textual.content import Content
 
-from rig.tui.actions import BY_NAME, Action, shown_key
+from rig.tui.actions import BY_NAME, PAGES, Action, shown_key
 from rig.tui.model import UNDER_WAY, Model, alarm
 from rig.tui.next_step import next_step
 from rig.tui.widgets.text import Words, link_action, plain
 
 LINKS = {"up": "● link up", "opening": "◌ opening", "down": "✗ link down", "closed": "○ no link"}
-_NAMED = "device", "run", "result", "session", "history"
-PAGES = {"protocol": "home", **{page: page for page in _NAMED}}
-"""Pages by name, with the text of their tabs."""
+TABS = {page: BY_NAME[f"page_{page}"].label for page, *_ in PAGES}
+"""Texts of the tabs, by page."""
 KEYS_SHOWN = 4
-_OF_PAGE = {
-    "protocol": ("go_on", "next", "previous"),
-    "device": ("go_on", "wave", "release_test"),
-    "result": ("go_on", "reject", "unblind", "part"),
-    "session": ("go_on", "control_chart", "report"),
-    "history": ("play", "next", "part", "sessions"),
-}
+_OF_PAGE = {page: keys.split() for page, *_, keys in PAGES}
 _ANYWHERE = ("go_on", "control", "part", "help")
 _TOLD_S = 4.0
 _UNANSWERED_S = 0.5
@@ -56,7 +47,7 @@ class StatusBar(Vertical):
 def _tabs(page: str, keys: Mapping[str, str]) -> Content:
     """Return all pages with their keys; each can be clicked."""
     parts: list[Content] = []
-    for name, title in PAGES.items():
+    for name, title in TABS.items():
         text = f" {shown_key(keys[f'page_{name}'])} {title} "
         look = "bold $background on $primary" if name == page else "$foreground 80%"
         parts += [link_action(Content.styled(text, look), f"app.do('page_{name}')"), Content(" ")]
@@ -71,7 +62,7 @@ def headline(model: Model, width: int) -> Content:
     right_side = f"{plain(model.port, 24)}  {link}" if model.port else link
     stamp = " ▲ SIMULATED " * model.simulated
     blind = " BLIND " * model.blind
-    name = PAGES.get(model.page, model.page).upper()
+    name = TABS.get(model.page, model.page).upper()
     title = model.state.section("session").get("title") or (
         model.protocol.title if model.protocol else "chainrig"
     )

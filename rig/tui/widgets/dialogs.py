@@ -1,7 +1,5 @@
 """Dialogs over a page. STOP remains visible below every dialog, and works."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A plot with its legend above, drawn again only if its content has changed."""
 
-from __future__ import annotations
-
 from time import monotonic
 
 from rig.tui.plotting import Picture, draw_picture

@@ -1,7 +1,5 @@
 """A line for each gate: state, edges, steadiness, by shape and word, not colour alone."""
 
-from __future__ import annotations
-
 from itertools import zip_longest
 
 from textual.content import Content
@@ -55,6 +53,6 @@ def label(model: Model, channel: int) -> str:
     """Return the name of a channel's gate."""
     for gate in model.protocol.gates.gates if model.protocol else ():
         if gate.channel == channel:
-            side = f"{gate.side} side, " * model.words.two_sides
+            side = f"{gate.side} side, " if model.words.two_sides else ""
             return f"channel {channel}: {side}{gate.height * 1e3:.1f} mm"
     return f"channel {channel}, which the protocol does not use"

@@ -1,7 +1,5 @@
 """The page widget: shows as many parts of a page's content as fit the screen."""
 
-from __future__ import annotations
-
 from itertools import zip_longest
 
 from textual.app import ComposeResult

@@ -1,21 +1,15 @@
 """Widget for lines of coloured spans, without the wrapping and styling of other text."""
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 from rich.segment import Segment
 from rich.style import Style
+from textual.geometry import Region
 from textual.strip import Strip
 from textual.widget import Widget
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from textual.geometry import Region
-
-    from rig.tui.braille import Span
+from rig.tui.braille import Span
 
 
 class SpanView(Widget):
