@@ -1,7 +1,5 @@
 """Arrays of numbers, as types."""
 
-from __future__ import annotations
-
 from typing import TypeAlias
 
 import numpy as np

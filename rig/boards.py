@@ -3,8 +3,6 @@
 A board that is there says the same of itself (`rig.link.messages.Identity`), and then that counts.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 GATES = 16

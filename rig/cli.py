@@ -5,29 +5,24 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from collections.abc import Sequence
 from importlib import import_module
+from types import FrameType
+from typing import TYPE_CHECKING
 
 from rig.command_page import first_answer, first_help
 from rig.errors import RigError
 from rig.streams import open_streams, say, settle_streams
 
-TYPE_CHECKING = False  # as typing has it, which takes a third as long as Python to load
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from types import FrameType
-
     from rig.command_help import Parser
 
 BAD_INPUT = 2
 INTERRUPTED = 130
-OPTIONAL = {
-    "distributed": "distributed",
-    "minisign": "py-minisign",
-    "mpmath": "mpmath",
-    "weasyprint": "weasyprint",
-}
-"""Packages that few need, with their names for pip: clusters for `rig sweep`, 50 digits for some of
-`rig bench`, a report as PDF, signatures."""
+OPTIONAL = ("distributed", "minisign", "mpmath", "weasyprint")
+"""Packages that few need: clusters for `rig sweep`, signatures, 50 digits for some of `rig bench`,
+a report as PDF."""
+_PIP_NAMES = {"minisign": "py-minisign"}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -108,8 +103,8 @@ def _refusal(error: BaseException) -> int:
         if package in OPTIONAL:
             from shlex import quote  # noqa: PLC0415 - never needed otherwise
 
-            install = f"{quote(sys.executable)} -m pip install {OPTIONAL[package]}"
-            say(f"rig: this needs {OPTIONAL[package]}: {install}")
+            name = _PIP_NAMES.get(package, package)
+            say(f"rig: this needs {name}: {quote(sys.executable)} -m pip install {name}")
             return BAD_INPUT
     if not isinstance(error, OSError):
         raise error

@@ -1,7 +1,5 @@
 """The command line as ``command_help.txt`` describes it: the parser, its help and its mistakes."""
 
-from __future__ import annotations
-
 import argparse
 import os
 import re
@@ -14,8 +12,6 @@ from typing import Any, NoReturn
 from rig import __version__
 from rig.command_page import COMMANDS, first_help
 from rig.streams import say
-
-TYPE_CHECKING = False
 
 _NAMED = rf"(?<![\w/.-])rig (?=(?:{'|'.join(COMMANDS)}|--help)(?![\w:-]))"
 """A command, but not the name that begins a program's own narration, as in ``rig daemon:``."""

@@ -1,14 +1,12 @@
 """What ``command_help.txt`` says of the commands, and the first help, as quick as Python itself."""
 
-from __future__ import annotations
-
-from collections import namedtuple
+from typing import NamedTuple
 
 from rig import __version__
+from rig.text_rows import read_paragraphs, read_text
 
 
-# Of collections, for typing takes a third as long to load as Python.
-class Command(namedtuple("Command", "name place text arguments examples")):
+class Command(NamedTuple):
     """One command, or one of two words below another.
 
     Attributes
@@ -28,29 +26,21 @@ class Command(namedtuple("Command", "name place text arguments examples")):
     examples: list[str]
 
 
-def _read_text(name: str) -> str:
-    place = __file__.replace("command_page.py", name)
-    with open(place, encoding="utf-8") as file:  # noqa: PTH123 - pathlib takes 5 ms
-        return file.read()
-
-
 def _read_page() -> dict[str, list[Command]]:
     """Return the commands of each group."""
-    paragraphs = _read_text("command_help.txt").strip().split("\n\n")
     groups: dict[str, list[Command]] = {}
     shared: dict[str, str] = {}
-    for paragraph in paragraphs:
-        head, *lines = paragraph.splitlines()
+    for head, *lines in read_paragraphs(__file__, "command_help.txt"):
         if head == "shared":
             shared = {line.partition(" |")[0]: line for line in lines}
-        elif head.startswith("## "):
-            groups[head.removeprefix("## ")] = commands = []
-        elif not head.startswith("#"):
+        elif head.startswith("= "):
+            groups[head.removeprefix("= ")] = commands = []
+        else:
             examples = [line.strip(" $") for line in lines if line.startswith("  $ ")]
             heading, text = head.split(": ", 1)
             name, _, place = heading.partition(" = ")
             place = place or f"{name.replace(' ', '_')}.main"
-            rows = [shared.get(line, line) for line in lines[: len(lines) - len(examples)]]
+            rows = [shared.get(line, line) for line in lines if not line.startswith("  $ ")]
             commands.append(Command(name, place, text, rows, examples))
     return groups
 
@@ -66,7 +56,7 @@ def first_help() -> str:
     for group, commands in GROUPS.items():
         top = (command for command in commands if " " not in command.name)
         lines += ["", f"{group}:", *(f"  {command.name:<12}{command.text}" for command in top)]
-    return _read_text("first_help.txt").replace("{commands}", "\n".join(lines))
+    return read_text(__file__, "first_help.txt").replace("{commands}", "\n".join(lines))
 
 
 def first_answer(words: list[str]) -> str:

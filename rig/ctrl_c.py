@@ -1,7 +1,5 @@
 """Signals that somebody else obeys, and Ctrl-C that waits where an exception would do harm."""
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Callable, Iterator

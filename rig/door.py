@@ -38,20 +38,6 @@ from rig.results.together import MeanDifference, TogetherResults, results_togeth
 from rig.results.whole import SessionResults, calibration, protocol_of, results
 from rig.session.store import Session
 
-__all__ = [
-    "Edges",
-    "MeanDifference",
-    "MeanResult",
-    "PredictedIncline",
-    "RecordedSession",
-    "RecordedSessions",
-    "Results",
-    "RunResult",
-    "open",
-    "predict",
-    "read_protocol",
-]
-
 
 def open(path: str | os.PathLike[str]) -> RecordedSession:  # noqa: A001 - it is rig.open
     """Open a session for reading.
@@ -250,8 +236,9 @@ class _Quantities:
         self.quantities = quantities
 
     def _written(self) -> str:
-        values = ((MEASURANDS[name], value) for name, value in self.quantities.items())
-        return ", ".join(f"{row.symbol} {with_unit(at, row)}" for row, at in values if row.told)
+        rows = ((MEASURANDS[name], value) for name, value in self.quantities.items())
+        parts = (f"{row.symbol} {with_unit(x, row)}" for row, x in rows if "told" in row.kinds)
+        return ", ".join(parts)
 
 
 class RunResult(_Quantities):

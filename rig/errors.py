@@ -1,18 +1,10 @@
 """One error root, each error with a hint for the user and an exit code for scripts."""
 
-from __future__ import annotations
-
-from collections import namedtuple
 from collections.abc import Iterable
-from typing import Any
-
-TYPE_CHECKING = False
+from typing import Any, NamedTuple
 
 
-# Of collections, for typing takes a third as long to load as Python.
-class Problem(
-    namedtuple("Problem", "file line column key message excerpt reason", defaults=("", None))
-):
+class Problem(NamedTuple):
     """One fault of an input file, at its place (lines and columns count from 1).
 
     `excerpt` is what a message shows below: the line itself and a caret, or nothing. `reason` is
@@ -24,8 +16,8 @@ class Problem(
     column: int
     key: str
     message: str
-    excerpt: str
-    reason: Any
+    excerpt: str = ""
+    reason: Any = None
 
     def __str__(self) -> str:
         key = f" {self.key}:" if self.key else ""

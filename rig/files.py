@@ -1,7 +1,5 @@
 """Files that are either the old one or the new one, never half of each."""
 
-from __future__ import annotations
-
 import errno
 import os
 import stat
@@ -12,13 +10,8 @@ from typing import BinaryIO
 
 from rig.errors import InputError
 
-_KINDS = {
-    stat.S_IFDIR: "a folder",
-    stat.S_IFIFO: "a pipe",
-    stat.S_IFSOCK: "a socket",
-    stat.S_IFCHR: "a device",
-    stat.S_IFBLK: "a device",
-}
+_KINDS = {"d": "a folder", "p": "a pipe", "s": "a socket", "c": "a device", "b": "a device"}
+"""What is no file, by the letter that ``ls -l`` has for it."""
 _SQLITE = b"SQLite format 3\0"
 """How a session file begins: nothing but its own recorder ever writes there."""
 _DESCRIPTORS = ("/dev/", "/proc/")
@@ -40,7 +33,7 @@ def require_file(path: str | os.PathLike[str], *, descriptors: bool = False) -> 
     OSError
         It is a folder, a pipe, a socket or a device, or nothing is there.
     """
-    kind = _KINDS.get(stat.S_IFMT(Path(path).stat().st_mode))
+    kind = _KINDS.get(stat.filemode(Path(path).stat().st_mode)[0])
     opened = descriptors and kind == "a pipe" and os.fspath(path).startswith(_DESCRIPTORS)
     if kind and not opened:
         raise OSError(errno.EINVAL, f"it is {kind}; name a file", os.fspath(path))

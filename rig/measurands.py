@@ -4,12 +4,10 @@ A new measurand is a row of ``measurands.txt`` and the function that computes it
 `rig.analysis.quantities`.
 """
 
-from __future__ import annotations
-
 import re
-from collections.abc import Container, Iterable, Iterator
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Container, Iterator
+from functools import partial
+from typing import NamedTuple
 
 from rig.text_rows import read_rows
 
@@ -17,8 +15,7 @@ _UNIT = re.compile(r"(_(m|kg|s|A|K|mol|cd|rad|sr|Hz|N|Pa|J|W|C|V|F|Ohm|S|Wb|T|H|
 """The SI unit at a name's end: base units and those with names of their own (SI brochure, 2.3)."""
 
 
-@dataclass(frozen=True, slots=True)
-class Measurand:
+class Measurand(NamedTuple):
     """One quantity.
 
     Attributes
@@ -33,14 +30,11 @@ class Measurand:
         For people: ``value · scale`` has that unit, and so many decimals where no uncertainty says.
     fine, fine_scale, fine_decimals
         The same for differences and scatter.
-    averaged
-        Whether it has a mean over the runs of an incline, which is compared with the model.
-    listed
-        Whether it stands in the list of runs and among a drop's numbers on the screen.
-    told
-        Whether the one line on a drop names it.
-    by_chain, by_side
-        Whether the difference that the striking chain makes is a result, and that of the sides.
+    kinds
+        In words: ``averaged`` where it has a mean over the runs of an incline, which is compared
+        with the model; ``listed`` where it stands in the list of runs and among a drop's numbers
+        on the screen; ``told`` where the one line on a drop names it; ``by_chain`` and ``by_side``
+        where the difference that the striking chain makes is a result, and that of the sides.
     """
 
     name: str
@@ -48,17 +42,13 @@ class Measurand:
     label: str
     title: str
     meaning: str
+    kinds: str
     unit: str
     scale: float
     decimals: int
     fine: str
     fine_scale: float
     fine_decimals: int
-    averaged: bool = False
-    listed: bool = False
-    told: bool = False
-    by_chain: bool = False
-    by_side: bool = False
 
     @property
     def stem(self) -> str:
@@ -75,18 +65,15 @@ class Measurand:
         return f"{self.title} {self.symbol} ({self.unit})"
 
 
-def _measurand(cells: Iterable[str]) -> Measurand:
-    name, symbol, label, title, usual, fine, flags, meaning = cells
-    (unit, scale, decimals), (fine_unit, fine_scale, fine_decimals) = usual.split(), fine.split()
-    options: dict[str, Any] = dict.fromkeys(flags.split(), True)
-    return Measurand(
-        *(name, symbol, label, title, meaning, unit, float(scale), int(decimals)),
-        *(fine_unit, float(fine_scale), int(fine_decimals)),
-        **options,
-    )
+def _scale(cell: str) -> tuple[str, float, int]:
+    unit, scale, decimals = cell.split()
+    return unit, float(scale), int(decimals)
 
 
-MEASURANDS = {row.name: row for row in map(_measurand, read_rows(__file__))}
+MEASURANDS = {
+    name: Measurand(name, symbol, label, title, meaning, kinds, *_scale(usual), *_scale(fine))
+    for name, symbol, label, title, meaning, kinds, usual, fine in read_rows(__file__)
+}
 
 SEPARATION = MEASURANDS["separation_m"]
 SPEED = MEASURANDS["speed_m_s"]
@@ -96,16 +83,15 @@ GRAVITY = MEASURANDS["gravity_m_s2"]
 ACCELERATION = MEASURANDS["acceleration_m_s2"]
 
 
+def of_kind(kind: str, among: Container[str] = MEASURANDS) -> Iterator[Measurand]:
+    """Yield those of a kind, see `Measurand.kinds`, whose names are among some."""
+    rows = MEASURANDS.values()
+    return (row for row in rows if kind in row.kinds and row.name in among)
+
+
+averaged, told = partial(of_kind, "averaged"), partial(of_kind, "told")
+
+
 def acceleration_in(names: Container[str]) -> Measurand | None:
     """Return what measures how something falls that strikes nothing, where that is among names."""
     return next((row for row in (GRAVITY, ACCELERATION) if row.name in names), None)
-
-
-def averaged() -> Iterator[Measurand]:
-    """Yield those that have a mean over the runs of an incline."""
-    return (row for row in MEASURANDS.values() if row.averaged)
-
-
-def told() -> Iterator[Measurand]:
-    """Yield those that one line on a drop names."""
-    return (row for row in MEASURANDS.values() if row.told)

@@ -1,7 +1,5 @@
 """Conversion of results to JSON data: members are attributes, mostly under the same names."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from operator import attrgetter

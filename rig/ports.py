@@ -1,7 +1,5 @@
 """Port URLs: which of them are simulations, and what a simulation needs to be told."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from urllib.parse import SplitResult, parse_qsl, urlencode, urlsplit
 
@@ -47,7 +45,7 @@ def fill_url(url: str, protocol: Path, session: Path, seed: int | None, before: 
     if seed is not None:
         settings["seed"] = str(seed)
     if _split(before).scheme == _split(url).scheme:
-        earlier = _settings(before)
+        earlier = read_settings(before)
         seed_before = earlier.get("seed", "0")
         if (new := settings.get("seed", seed_before)) != seed_before:
             raise rig_error("seed_differs", path=session, before=seed_before, seed=new)
@@ -87,14 +85,20 @@ def read_settings(url: str) -> dict[str, str]:
         A setting that is given twice, or see `check_name`.
     """
     check_name(url)
-    return _settings(url)
+    parts, settings = _split(url), dict[str, str]()
+    for name, text in parse_qsl(parts.query, keep_blank_values=True, errors=_BYTES):
+        if name in settings:
+            raise rig_error("setting_repeated", scheme=parts.scheme, name=name)
+        settings[name] = text
+    return settings
 
 
 def told(url: str) -> str:
     """Return a port's URL for the record: a simulation's without the names of files."""
     if not is_simulated(url):
         return url
-    return _with_settings(url, {n: text for n, text in _settings(url).items() if n not in _FILES})
+    settings = {name: text for name, text in read_settings(url).items() if name not in _FILES}
+    return _with_settings(url, settings)
 
 
 def truth_file(session: Path) -> Path:
@@ -107,15 +111,6 @@ def _split(url: str) -> SplitResult:
         return urlsplit(url)
     except ValueError as error:
         raise rig_error("not_a_port", port=url, text=error) from None
-
-
-def _settings(url: str) -> dict[str, str]:
-    parts, settings = _split(url), dict[str, str]()
-    for name, text in parse_qsl(parts.query, keep_blank_values=True, errors=_BYTES):
-        if name in settings:
-            raise rig_error("setting_repeated", scheme=parts.scheme, name=name)
-        settings[name] = text
-    return settings
 
 
 def _with_settings(url: str, settings: dict[str, str], **usual: str) -> str:

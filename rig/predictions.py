@@ -5,18 +5,16 @@ Mechanics that a scene does not have are not loaded.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from rig.measurands import ACCELERATION, FALL_TIME, GRAVITY, SEPARATION, SPEED
+from rig.measurands import ACCELERATION, FALL_TIME, GRAVITY, SEPARATION, SPEED, Measurand
 from rig.model.prediction import PredictedIncline
 from rig.protocol.contact import as_struck, at_contact
 from rig.units import Quantity
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rig.measurands import Measurand
     from rig.model.chain import Chain
     from rig.model.surface import Surface
     from rig.protocol.protocol import Protocol, RodChain, Run

@@ -1,7 +1,5 @@
 """Text from outside, made safe for a log, a terminal and a file."""
 
-from __future__ import annotations
-
 import unicodedata
 
 _HIDDEN = {"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"}

@@ -1,7 +1,5 @@
 """Where ready files are: in the installed package, or in the project it runs from."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

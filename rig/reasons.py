@@ -4,8 +4,6 @@ Whoever finds something returns ``Reason(code, values)``; the table in `rig.word
 it is, what it is called, how it reads and what to do about it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -107,9 +105,8 @@ def rig_error(code: str, /, **values: Any) -> RigError:
 
 
 def _plain_value(value: object) -> object:
-    if isinstance(value, OSError) and value.strerror:
-        return value.strerror
-    return str(value) if isinstance(value, Exception | PurePath) else value
+    text = getattr(value, "strerror", None) or value
+    return str(text) if isinstance(value, Exception | PurePath) else value
 
 
 def error_of(kind: type[Failure], reason: Reason) -> Failure:
@@ -159,7 +156,7 @@ def _label(reason: Reason) -> str:
     """Return a reason's label, with what tells it from others of its code."""
     words = ", ".join(value for value in reason.values.values() if isinstance(value, str))
     label = WORDINGS[reason.code].label or reason.code.replace("_", " ")
-    return label + (f" ({words})" if words else "")
+    return f"{label} ({words})" if words else label
 
 
 class _Number(float):

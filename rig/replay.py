@@ -1,7 +1,5 @@
 """Feed a recorded conversation through the whole stack again, and compare the outcome."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from operator import attrgetter

@@ -1,7 +1,5 @@
 """The headless runner: carries out a protocol's plan, drop by drop, on one session file."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable
 from contextlib import closing, suppress
@@ -139,10 +137,12 @@ class Campaign:
         DeviceError
             The device is in trouble, or refuses what nobody there can help.
         """
-        while self.flow.stage not in {Stage.DONE, Stage.HALTED}:
-            effects = deque(self._take(self._next()))
-            while effects:
-                effects += self._take(self._carry_out(effects.popleft()))
+        effects: deque[Effect] = deque()
+        while effects or self.flow.stage not in {Stage.DONE, Stage.HALTED}:
+            event = self._carry_out(effects.popleft()) if effects else self._next()
+            if event is not None:
+                self.flow, wanted = step(self.flow, event)
+                effects += wanted
         if self.flow.stage is Stage.HALTED:
             why, _, hint = self.flow.trouble.partition("\n")
             self.operator.say(f"stopped: {why}\n  hint: {hint} (the same command continues)")
@@ -181,15 +181,6 @@ class Campaign:
             clock = self.live.clock(self.session).device
             self._clock_u = None if clock is None else clock.u
         return rest_s(self.protocol.plan.settle, self._clock_u)
-
-    # ------------------------------------------------------------------ effects
-
-    def _take(self, event: Event | None) -> tuple[Effect, ...]:
-        """Tell the plan what came of an effect, if anything, and return what it wants now."""
-        if event is None:
-            return ()
-        self.flow, effects = step(self.flow, event)
-        return effects
 
     def _carry_out(self, effect: Effect) -> Event | None:
         """Carry one effect out, and return what came of it.

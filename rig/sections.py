@@ -1,7 +1,5 @@
 """Sections that fail alone: one that cannot be made is named, and takes no other along."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

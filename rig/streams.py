@@ -1,7 +1,5 @@
 """stdout and stderr: closed, full or read by nobody any more, they never change an exit code."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterator
@@ -10,8 +8,6 @@ from io import TextIOWrapper
 from typing import TextIO
 
 from rig.printable import printable
-
-TYPE_CHECKING = False
 
 
 def open_streams() -> None:

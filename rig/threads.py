@@ -1,7 +1,5 @@
 """Processors, and one thread for linear algebra: with small matrices threads are in the way."""
 
-from __future__ import annotations
-
 import os
 import threading
 from contextlib import ContextDecorator

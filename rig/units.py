@@ -4,8 +4,6 @@ The number is scaled by an exact fraction and rounded once, so ``48.5 mm`` is th
 0.0485 and not the product of two floats.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -150,19 +148,16 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
             accepted_form = f"write a decimal point, not a comma: {pointed}"
         raise UnitError(f"found {quote(text)}; {accepted_form}")
     parts = match.groupdict()
-    unit, u_unit = parts["unit"], parts["u_unit"]
-    if parts["u"] is not None:
+    unit, u_unit, u_number = parts["unit"], parts["u_unit"], parts["u"]
+    if u_number is not None:
         unit, u_unit = _shared_unit(clean, unit, u_unit)
     factor = _factor(unit, dimension, clean)
     value = _scale(parts["value"], factor / int(parts["per"] or 1), clean)
     if parts["last"]:
-        if parts["u"] is not None:
+        if u_number is not None:
             raise UnitError(f"found {quote(text)} with two uncertainties; {accepted_form}")
-        digits = Decimal(parts["value"]).as_tuple().exponent
-        return Quantity(value, _scale(f"{parts['last']}e{digits}", factor, clean))
-    if parts["u"] is None:
-        return Quantity(value)
-    u = _scale(parts["u"], _factor(u_unit or unit, dimension, clean), clean)
+        u_number = f"{parts['last']}e{Decimal(parts['value']).as_tuple().exponent}"
+    u = _scale(u_number or "0", _factor(u_unit or unit, dimension, clean), clean)
     if u < 0:
         raise UnitError(f"found {quote(text)}; an uncertainty is at least 0")
     return Quantity(value, u)

@@ -3,17 +3,13 @@
 Every sentence that names what falls takes its words from here.
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from rig.text_rows import read_rows
 
 
-@dataclass(frozen=True, slots=True)
-class Vocabulary:
-    """The words of one kind of scene.
+class Vocabulary(NamedTuple):
+    """The words of one kind of scene, a row of ``vocabulary.txt``.
 
     Attributes
     ----------
@@ -30,7 +26,7 @@ class Vocabulary:
     reset
         What is done by hand before each drop.
     two_sides
-        Whether gates and chains are told apart by their side.
+        Empty unless gates and chains are told apart by their side.
     """
 
     scene: str
@@ -39,18 +35,9 @@ class Vocabulary:
     part: str
     setup: str
     reset: str
-    two_sides: bool = False
+    two_sides: str
 
 
-def _vocabulary(cells: Iterable[str]) -> Vocabulary:
-    scene, body, start, part, setup, handling = cells
-    two_sides = scene == "two-chains"
-    return Vocabulary(scene, body, start, part, setup, f"{handling} {body}", two_sides)
-
-
-_SCENES = [*map(_vocabulary, read_rows(__file__))]
-OBJECT, TRACK, FENCE, FREE_CHAIN, ONE_CHAIN, TWO_CHAINS = _SCENES
-ANY_SCENE = Vocabulary(
-    "", "what falls", "it starts", "part", "your set-up", "preparing it", two_sides=True
-)
-VOCABULARIES = {words.scene: words for words in (*_SCENES, ANY_SCENE)}
+_SCENES = [Vocabulary(*cells) for cells in read_rows(__file__)]
+OBJECT, TRACK, FENCE, FREE_CHAIN, ONE_CHAIN, TWO_CHAINS, ANY_SCENE = _SCENES
+VOCABULARIES = {words.scene: words for words in _SCENES}

@@ -4,11 +4,9 @@ The rows are in ``wordings.txt``. `rig.reasons` fills in values and the words of
 are written there, never read back.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
 from enum import IntEnum
 from string import Template
+from typing import NamedTuple
 
 from rig import errors
 from rig.errors import RigError
@@ -26,8 +24,7 @@ class Severity(IntEnum):
     VOID = 2
 
 
-@dataclass(frozen=True, slots=True)
-class Wording:
+class Wording(NamedTuple):
     """What the program says of one code.
 
     Attributes
@@ -46,28 +43,25 @@ class Wording:
 
     severity: Severity
     sentence: str
-    remedy: str = ""
-    label: str = ""
-    error: type[RigError] = RigError
+    remedy: str
+    label: str
+    error: type[RigError]
 
 
-def _read_rows() -> tuple[dict[str, Wording], dict[str, str]]:
-    """Return the rows of the table by their codes, and the texts that several share."""
-    rows: dict[str, Wording] = {}
-    shared: dict[str, str] = {}
-    for head, *lines in read_paragraphs(__file__):
-        if head == "shared":
-            shared = dict(line.strip().split(": ", 1) for line in lines)
-            continue
-        name, _, label = head.partition(": ")
-        kind, code = name.split()
-        error = vars(errors).get(kind)
-        severity = Severity[kind.upper()] if error is None else Severity.VOID
-        sentence, *remedy = (Template(line.strip()).safe_substitute(shared) for line in lines)
-        rows[code] = Wording(severity, sentence, "".join(remedy), label, error or RigError)
-    return rows, shared
-
-
-WORDINGS, _SHARED = _read_rows()
-"""What the program says of each code, and what several of them say."""
+(_, *_TEXTS), *_PARAGRAPHS = read_paragraphs(__file__)
+_SHARED = dict(line.strip().split(": ", 1) for line in _TEXTS)
+"""What several sentences say, by name."""
 LOOK = _SHARED["look"]
+
+
+def _wording(head: str, *lines: str) -> tuple[str, Wording]:
+    """Read a paragraph of the table: a code, and what the program says of it."""
+    name, _, label = head.partition(": ")
+    kind, code = name.split()
+    error = vars(errors).get(kind)
+    severity = Severity[kind.upper()] if error is None else Severity.VOID
+    sentence, *remedy = (Template(line.strip()).safe_substitute(_SHARED) for line in lines)
+    return code, Wording(severity, sentence, "".join(remedy), label, error or RigError)
+
+
+WORDINGS = dict(_wording(*paragraph) for paragraph in _PARAGRAPHS)

@@ -63,7 +63,7 @@ class Budgets:
         measured = zip(values, self._measure(drop, [*values.values()]), strict=True)
         # Only means are compared with a prediction.
         return {
-            name: value if MEASURANDS[name].averaged else replace(value, deviation=None)
+            name: value if "averaged" in MEASURANDS[name].kinds else replace(value, deviation=None)
             for name, value in measured
         }
 

@@ -17,7 +17,7 @@ import numpy as np
 from rig.analysis.averages import combine
 from rig.analysis.result import DropResult, Measured, good_runs
 from rig.arrays import Array
-from rig.measurands import MEASURANDS
+from rig.measurands import of_kind
 from rig.plain_data import Record
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Protocol
@@ -82,9 +82,11 @@ def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects,
             if good.keys() >= {*four} and [run.impact for run in four] == order
         ]
         if blocks:
-            rows = [row for row in MEASURANDS.values() if row.name in blocks[0][0].quantities]
-            chain = {r.name: _effect(blocks, r.name, signs / 2.0) for r in rows if r.by_chain}
-            side = {r.name: _effect(blocks, r.name, signs**2 / 4.0) for r in rows if r.by_side}
+            known = blocks[0][0].quantities
+            chain, side = (
+                {r.name: _effect(blocks, r.name, weight) for r in of_kind(kind, known)}
+                for kind, weight in (("by_chain", signs / 2.0), ("by_side", signs**2 / 4.0))
+            )
             every.append(Effects(incline, setting, (first, second), len(blocks), chain, side))
     return tuple(every)
 

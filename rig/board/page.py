@@ -1,7 +1,5 @@
 """What stands on the page: the session as it is on the disk, and how its latest drop fell."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path

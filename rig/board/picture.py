@@ -1,19 +1,14 @@
 """A drop to scale, moment by moment, as the terminal draws it."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
+from rig.protocol.protocol import Protocol, Run
 from rig.tui.indicators import Indicators
+from rig.tui.motion import ChainFall
 from rig.tui.scale import drawing
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rig.protocol.protocol import Protocol, Run
-    from rig.tui.motion import ChainFall
 
 _MOMENTS = 60  # between which the page moves
 _AFTER_S = 0.02

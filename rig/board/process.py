@@ -4,8 +4,6 @@ It has a lower priority and only one line to the daemon, on which nothing comes 
 browsers do, neither the port nor STOP notices; when the daemon ends, so does the page.
 """
 
-from __future__ import annotations
-
 import asyncio
 import json
 import logging

@@ -3,29 +3,16 @@
 Nothing of a request is kept, and no request makes the page: it is there when it is asked for.
 """
 
-from __future__ import annotations
-
 import gzip
+import socket
 from hashlib import sha256
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-if TYPE_CHECKING:
-    import socket
+from rig.text_rows import read_rows
 
 _PATIENCE_S = 20.0
-_HEADERS = {
-    "Allow": "GET",
-    "Content-Security-Policy": "default-src 'none'; style-src 'unsafe-inline'; "
-    "script-src '{script}'; connect-src 'self'; img-src data:; base-uri 'none'; "
-    "form-action 'none'; frame-ancestors 'none'",
-    "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
-    "Cross-Origin-Resource-Policy": "same-origin",
-    "Cache-Control": "no-cache",
-    "Vary": "Accept-Encoding",
-}
 
 
 class _Page(NamedTuple):
@@ -54,7 +41,7 @@ class PageServer(ThreadingHTTPServer):
         super().__init__(listener.getsockname()[:2], _Answers, bind_and_activate=False)
         self.socket.close()
         self.socket = listener
-        self.headers = {name: text.format(script=script) for name, text in _HEADERS.items()}
+        self.headers = [(name, text.format(script=script)) for name, text in read_rows(__file__)]
 
     def show(self, page: str) -> None:
         """Have another page."""
@@ -103,7 +90,7 @@ class _Answers(BaseHTTPRequestHandler):
 
     def end_headers(self) -> None:
         """Add what every answer has."""
-        for name, text in self.server.headers.items():
+        for name, text in self.server.headers:
             self.send_header(name, text)
         super().end_headers()
 

@@ -5,8 +5,6 @@ shows wherever it is. The description is an RO-Crate as the ELN consortium wants
 and a row a file.
 """
 
-from __future__ import annotations
-
 import hashlib
 import io
 import json
@@ -44,14 +42,14 @@ def to_json(value: object) -> bytes:
     return (json.dumps(value, indent=1, ensure_ascii=False, allow_nan=False) + "\n").encode()
 
 
-def seal(files: Mapping[str, bytes], about: Mapping[str, str]) -> dict[str, bytes]:
+def seal(files: Mapping[str, bytes], title: str, words: str, date: str) -> dict[str, bytes]:
     """Add the crate's description and the list of hashes to some files.
 
     Parameters
     ----------
     files
         Contents by name.
-    about
+    title, words, date
         The crate's ``name``, ``description`` and ``datePublished``.
     """
     kinds = mimetypes.MimeTypes()  # Python's own list: the system's differs between systems
@@ -69,7 +67,8 @@ def seal(files: Mapping[str, bytes], about: Mapping[str, str]) -> dict[str, byte
     crate = json.loads(read_text(__file__, "crate.json"))
     _, root, program, *_ = crate["@graph"]
     program["version"] = __version__
-    root |= {**about, "hasPart": [{"@id": file["@id"]} for file in described]}
+    parts = [{"@id": file["@id"]} for file in described]
+    root |= {"name": title, "description": words, "datePublished": date, "hasPart": parts}
     crate["@graph"] += described
     return list_hashes({**files, CRATE: to_json(crate)})
 

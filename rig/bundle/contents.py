@@ -3,8 +3,6 @@
 To verify a bundle is to make its files again and to compare.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re
@@ -74,18 +72,16 @@ def bundle_files(
         Contents by name, ``SHA256SUMS`` included.
     """
     protocol = protocol_of(session)
-    texts = csv_files(session, results.json(), results.clock)
-    readme = texts.pop("README.txt")
+    tables = csv_files(session, results.json(), results.clock)
+    readme = tables.pop("README.txt")
     # What drops have in common, and so covariances, only a joint fit knows.
-    tables = {**texts, **mean_tables(protocol, results.complete or results.analysis)}
-    texts = {
-        **{f"tables/{name}": text for name, text in tables.items()},
-        "README.txt": readme,
-        "protocol.yaml": session.protocol_text,
-        HISTORY: "\n".join([*history, ""]),
-    }
-    files = {name: text.encode() for name, text in texts.items()} | {
+    tables |= mean_tables(protocol, results.complete or results.analysis)
+    files = {
         **drawn,
+        **{f"tables/{name}": text.encode() for name, text in tables.items()},
+        "README.txt": readme.encode(),
+        "protocol.yaml": session.protocol_text.encode(),
+        HISTORY: "\n".join([*history, ""]).encode(),
         "tables/datapackage.json": to_json(data_package(tables)),
         RESULTS: to_json(results.json()),
         ENVIRONMENT: to_json(environment()),
@@ -95,12 +91,8 @@ def bundle_files(
         name = re.sub(r"[^\w.-]+", "_", attached.name)
         files[f"attached/{number}-{name}"] = attached.data
     world = "Simulated drops: nothing fell." if session.simulated else "Drops past photogates."
-    about = {
-        "name": protocol.title or "A session",
-        "description": world,
-        "datePublished": session.meta["created"],  # the only date: no other would come again
-    }
-    return seal(files, about)
+    # The only date: no other would come again.
+    return seal(files, protocol.title or "A session", world, session.meta["created"])
 
 
 def compare(stored: Mapping[str, bytes], derived: Mapping[str, bytes]) -> Iterator[str]:

@@ -1,7 +1,5 @@
 """Means with their degrees of freedom, and the covariance of means, as tables of a bundle."""
 
-from __future__ import annotations
-
 import math
 from itertools import combinations
 
@@ -28,6 +26,7 @@ def mean_tables(protocol: Protocol, analysis: Analysis) -> dict[str, str]:
             means.append({**at, "n": line.n, "quantity": name, **mean.json(), "degrees": degrees})
             if mean.shared is not None:
                 shared[line.condition, name] = mean.shared
+    pairs = combinations(shared.items(), 2)
     covariances: list[dict[str, object]] = [
         {
             **first.json(),
@@ -36,9 +35,7 @@ def mean_tables(protocol: Protocol, analysis: Analysis) -> dict[str, str]:
             "quantity_2": other_quantity,
             "covariance": float(vector @ other_vector),
         }
-        for (first, quantity), vector, (second, other_quantity), other_vector in (
-            (*one, *other) for one, other in combinations(shared.items(), 2)
-        )
+        for ((first, quantity), vector), ((second, other_quantity), other_vector) in pairs
         if first != second
     ]
     tables = {"means.csv": means, "covariances.csv": covariances}

@@ -1,7 +1,5 @@
 """Signatures in the minisign format, by py-minisign (the extra ``sign``)."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Callable, Mapping

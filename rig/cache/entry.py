@@ -1,7 +1,5 @@
 """What the same program computed from the same content before, on this computer."""
 
-from __future__ import annotations
-
 import hashlib
 import platform
 import sqlite3

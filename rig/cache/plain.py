@@ -4,8 +4,6 @@ Not pickle: what is read back can only be numbers, texts and plain records of th
 whoever wrote it.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Mapping

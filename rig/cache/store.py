@@ -5,15 +5,12 @@ takes its place whole, so several processes may use the cache at once, and what 
 began is no entry.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 import zlib
 from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
-from typing import NamedTuple
 
 import platformdirs
 
@@ -21,13 +18,6 @@ _MOST_BYTES = 512 << 20
 """A session of 108 runs takes 2 MB of it; a single entry may take a sixteenth."""
 _PARTS = 16
 """Folders that share it, by a key's first digit: for room in one, no other is looked through."""
-
-
-class CacheSize(NamedTuple):
-    """How many entries there are, and how many bytes they take."""
-
-    entries: int
-    used_bytes: int
 
 
 class CacheFolder:
@@ -72,11 +62,10 @@ class CacheFolder:
             finally:  # a full disk gets its room back
                 begun.unlink(missing_ok=True)
 
-    def size(self) -> CacheSize | None:
-        """Return how much is kept; `None` where no cache can be used."""
+    def sizes(self) -> list[int] | None:
+        """Return how many bytes each entry takes; `None` where no cache can be used."""
         with suppress(OSError):
-            sizes = [file.stat().st_size for file in self._kept_files()]
-            return CacheSize(len(sizes), sum(sizes))
+            return [file.stat().st_size for file in self._kept_files()]
         return None
 
     def clear(self) -> None:

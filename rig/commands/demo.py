@@ -78,7 +78,7 @@ def beside_truth(analysis: Analysis, session: Path) -> list[str]:
         abs(value.value - truth[name]) <= value.expanded
         for result, truth in drops
         for name, value in result.quantities.items()
-        if MEASURANDS[name].averaged and name in truth
+        if "averaged" in MEASURANDS[name].kinds and name in truth
     ]
     return [
         *(row for part in table_parts("truth", drops) for row in part.table),

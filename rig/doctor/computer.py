@@ -94,10 +94,10 @@ def check_packages(owner: str) -> str:
 
 def describe_cache(cache: CacheFolder) -> str:
     """Say how much room kept results take."""
-    folder, size = cache.folder, cache.size()
-    if size is None:
+    folder, sizes = cache.folder, cache.sizes()
+    if sizes is None:
         return f"none: {folder} is not a folder in which this user, and nobody else, can write"
-    used = f"{size.entries} of {size.used_bytes / 1e6:.1f} MB in {folder}"
+    used = f"{len(sizes)} of {sum(sizes) / 1e6:.1f} MB in {folder}"
     return f"{used}; --clear-cache forgets them"
 
 

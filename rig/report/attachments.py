@@ -1,7 +1,5 @@
 """Files attached to a page for its readers, within a limit of size."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Iterable
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Figures as files: the same figure gives the same bytes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal, get_args

@@ -1,14 +1,12 @@
 """Tables of terminal and page, as described in `columns.txt`."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
 
-from rig.measurands import MEASURANDS, Measurand
+from rig.measurands import MEASURANDS, Measurand, of_kind
 from rig.report.numbers import degrees, fixed, plus_minus
 from rig.text_rows import read_paragraphs
 from rig.text_table import text_table
@@ -74,7 +72,7 @@ def table_parts(
             [_cell(place, way, kind, derived, record) for record in records],
         )
         for heading, place, way, *each in table.rows
-        for kind in (_kinds(each[0]) if each else [row])
+        for kind in (of_kind(each[0].removeprefix("each ")) if each else [row])
     ]
     columns = [(head, cells) for head, cells in columns if any(cells)]
     if records or words:
@@ -113,10 +111,6 @@ def read_tables(module: str, file: str = "") -> Iterator[tuple[str, _Table]]:
         (_, name, heading, *place), *rows = (re.split(r"^\[|\] | {2,}", line) for line in lines)
         words = " ".join(row[0] for row in rows if len(row) == 1)
         yield name, _Table(heading, words, [row for row in rows if len(row) > 1], *place)
-
-
-def _kinds(each: str) -> list[Measurand]:
-    return [row for row in MEASURANDS.values() if getattr(row, each.removeprefix("each "))]
 
 
 def _cell(place: str, way: str, row: Measurand | None, derived: Derived, record: Any) -> str:

@@ -1,7 +1,5 @@
 """Comparison of sessions: tables, a figure and a page of their differences."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

@@ -22,7 +22,8 @@ def design_lines(design: Mapping[str, Any]) -> list[str]:
 def _uncertainties(layout: Mapping[str, Any]) -> dict[str, str]:
     """Write the standard uncertainty of each quantity of one run, and of each coefficient."""
     runs = [(MEASURANDS[line["name"]], line["u_run"]) for line in layout["measurands"]]
-    u = {f"{row.symbol} of one run ({row.fine})": u * row.fine_scale for row, u in runs if row.told}
+    runs = [(row, u * row.fine_scale) for row, u in runs if "told" in row.kinds]
+    u = {f"{row.symbol} of one run ({row.fine})": value for row, value in runs}
     u |= {
         symbol(line["name"]): line["u"] if line["identified"] else None
         for line in layout["coefficients"]

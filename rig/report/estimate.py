@@ -1,7 +1,5 @@
 """Results of `rig estimate` in words and tables, for terminal and page."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """Figures of the results of `rig estimate`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Any
 

@@ -6,8 +6,6 @@ for a constant acceleration a: between impacts, that of gravity. Release, accele
 those of the session's results.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from fractions import Fraction
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Plain sentences about a session: its card, remarks on its results, deviations from its plan."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Colours of all figures, on light and dark pages, as named in `looks.txt`."""
 
-from __future__ import annotations
-
 from rig.text_rows import read_rows
 
 COLORS = [colors for _, *colors in read_rows(__file__, mark=None)]

@@ -4,8 +4,6 @@ Rods hang along the level lines of the board, and a beam crosses them from front
 beam meets the board uphill, unless the board has a slot, or the uphill part is before the board.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Formatting of numbers: the uncertainty determines the digits."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
-from rig.analysis.result import COUNTS
-from rig.measurands import acceleration_in, averaged
+from rig.analysis.result import COUNTS, Measured
+from rig.measurands import Measurand, acceleration_in, averaged
 from rig.reasons import remedies, sentences
-from rig.report.columns import table_parts
+from rig.report.columns import Part, table_parts
 from rig.report.numbers import degrees, signed
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from rig.analysis.result import Measured
     from rig.analysis.summary import Incline
-    from rig.measurands import Measurand
-    from rig.report.columns import Part
 
 
 Bars = Literal["U95", "u", "SE", "SD", "half-SD"]

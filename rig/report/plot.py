@@ -1,35 +1,29 @@
 """Drawing of figures with matplotlib, with labels beside the series, for files and pages."""
 
-from __future__ import annotations
-
 import io
 import re
 import textwrap
 import tomllib
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from html import escape
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from rig.arrays import Array
 from rig.ctrl_c import ctrl_c_waits
+from rig.report.canvas import Kind
+from rig.report.figure import Chart, Panel, Trace
 from rig.report.looks import COLORS, INK, MODEL, PAPER, SECOND, SIZE
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from matplotlib.axes import Axes
-
-    from rig.arrays import Array
-    from rig.report.canvas import Kind
-    from rig.report.figure import Chart, Panel, Trace
 
 _LETTER, _TYPED = 0.57 * SIZE, 0.61 * SIZE
 """Mean width of the digits and letters of the fonts in question, and those of a typewriter."""

@@ -3,8 +3,6 @@
 All numbers come from the session's results; nothing is computed here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import datetime
 from functools import partial

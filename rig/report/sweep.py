@@ -1,7 +1,5 @@
 """Figure of a sweep: curves along a parameter, or maps over two."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Timelines of drops: a line for each gate, with a bar while its beam was blocked."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Sequence
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """Wiring diagram of a board, with only the parts that a scene needs."""
 
-from __future__ import annotations
-
 import re
 from xml.etree import ElementTree
 

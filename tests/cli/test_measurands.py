@@ -17,7 +17,7 @@ SIZE = [(120, 36)]
 BLOW = Measurand(
     "free_blow_J", "Ef", "free energy", "energy of the free chain",
     "kinetic energy of a kilogram of the free chain when the other one reaches the surface",
-    "kJ", 1e-3, 5, "J", 1.0, 3, averaged=True, listed=True, told=True, by_chain=True,
+    "averaged listed told by_chain", "kJ", 1e-3, 5, "J", 1.0, 3,
 )  # fmt: skip
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from hashlib import sha256
@@ -15,15 +16,12 @@ from markupsafe import Markup, escape
 from rig import measurands
 from rig.reasons import sentences
 from rig.report import looks, numbers
-from rig.report.figure import COLUMN_PT, WIDE_PT
+from rig.report.columns import Part
+from rig.report.figure import COLUMN_PT, WIDE_PT, Chart
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
     from jinja2 import Environment
 
-    from rig.report.columns import Part
-    from rig.report.figure import Chart
 
 _CODE = re.compile("`([^`]*)`")
 _WIDTHS = {"slim": COLUMN_PT, "wide": WIDE_PT}
