@@ -6,12 +6,10 @@ from dataclasses import replace
 import pytest
 
 from rig.analysis.comparison import compare
-from rig.analysis.curves import model_curves
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.result import Deviation, Measured, good_runs
-from rig.protocol.plan import runs
 from rig.units import Quantity
-from tests.analysis.drops import FENCE, UNIFORM
+from tests.analysis.drops import UNIFORM
 from tests.analysis.test_summary import results
 from tests.estimate.sessions import analysis
 
@@ -84,22 +82,3 @@ def test_what_the_protocol_states_of_coefficients_counts_once():
             one for one in whole["speed_m_s"].differences if one.condition == line.condition
         ]
         assert line.differences["speed_m_s"] == other
-
-
-def test_gravity_is_compared_with_what_the_protocol_states():
-    run = runs(FENCE)[0]
-    stated = replace(FENCE, gravity=Quantity(9.81, 0.03))
-    drop = replace(
-        results(UNIFORM, {40.0: [0.1]})[0],
-        run=run,
-        quantities={"gravity_m_s2": Measured(9.86, 0.04)},
-    )
-    (comparison,) = compare(stated, [drop])
-    assert comparison.differences[0].normalized_error == pytest.approx(0.05 / (Z * 0.05), rel=2e-6)
-
-
-def test_curves_of_exact_coefficients_have_no_width():
-    known = replace(EXACT, drop=Quantity(0.18), gravity=Quantity(9.81))
-    curves = model_curves(replace(known, surface=replace(EXACT.surface, pile=None)))
-    assert {*curves["separation_U95_m"], *curves["speed_U95_m_s"]} == {0.0}
-    assert min(model_curves(UNIFORM)["speed_U95_m_s"]) > 0.0

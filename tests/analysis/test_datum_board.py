@@ -9,11 +9,7 @@ import pytest
 from rig.errors import InputError
 from rig.predictions import predicted_run
 from rig.protocol import contact, reader
-from rig.protocol.describe import describe
-from rig.reasons import sentences
-from sim.dials import Dials
-from tests.analysis.drops import GRADED, UNIFORM, assert_true, case
-from tests.analysis.sessions import analysis
+from tests.analysis.drops import GRADED, UNIFORM, case
 
 
 def raised(text: str, by_mm: float) -> str:
@@ -69,36 +65,6 @@ def test_what_is_measured_is_the_same_from_board_and_from_contact(incline):
     model = {name: (one.value, one.u) for name, one in predicted_run(BOARD, one.run).items()}
     for name, value in predicted_run(other.protocol, one.run).items():
         assert model[name] == pytest.approx((value.value, value.u), rel=1e-9)
-
-
-def test_drops_at_several_inclines_are_fitted_together():
-    drops = [case(BOARD, Dials(), incline=incline, attempt=attempt)
-             for incline in (10.0, 50.0) for attempt in (1, 2)]  # fmt: skip
-    found = analysis(drops)
-    assert found.joint is not None
-    results = [*found.runs, *found.superseded]
-    truths = sorted((one.truth for one in drops), key=lambda one: (one.attempt, one.run))
-    results.sort(key=lambda one: (one.attempt, one.run.number))
-    for result, truth in zip(results, truths, strict=True):
-        assert_true(result, truth, 1.5, ("separation_m", "speed_m_s", "release_skew_s"))
-
-
-def test_gates_are_named_by_the_heights_of_the_file():
-    swapped = {0: 2, 2: 0}
-    one = case(BOARD, Dials(), incline=50.0)
-    edges = [edge._replace(channel=swapped.get(edge.channel, edge.channel))
-             for edge in one.drop.edges]  # fmt: skip
-    said = sentences(one.with_edges(edges).analyze().reasons)
-    assert "42 mm" in said
-    assert "90 mm" in said
-
-
-def test_check_says_where_rods_touch():
-    said = describe(BOARD)
-    assert "drop: 200.0 ± 2.0 mm above the board" in said
-    assert "at 0° a rod touches when its middle is 16.8 mm above the board" in said
-    assert "at 50° a rod touches when its middle is 20.4 mm above the board" in said
-    assert "touches when its middle is 22.2 mm to 38.4 mm above" in describe(BOARD_GRADED)
 
 
 @pytest.mark.parametrize("key", ["rod_length", "diameter"])

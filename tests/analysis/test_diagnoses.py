@@ -6,9 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.studies.diagnoses import judged
-from bench.studies.layout_catalogue import KINDS, STANDARD, GateLayout, Kind, graded, under
-from bench.studies.wrong_rigs import WRONG_RIGS
+from bench.studies.layout_catalogue import KINDS, STANDARD, under
 from rig.analysis.faults import Premise, Suspects, alike, faults, rods_of, turn
 from rig.analysis.result import GOOD
 from rig.clock.calibration import TimeScale
@@ -18,10 +16,9 @@ from rig.protocol.protocol import Drag
 from rig.protocol.reader import parse
 from rig.records import Edge
 from rig.units import Quantity
-from sim.dials import Dials, read_dials
+from sim.dials import Dials
 from tests.analysis.drops import GRADED, HZ, UNIFORM, Case, case, codes, with_dials
 from tests.analysis.sessions import MILD
-from tests.tables import cases
 
 
 def exchanged(one: Case, a: int, b: int) -> Case:
@@ -134,45 +131,6 @@ def test_what_looks_the_same_both_ways_is_no_fault():
 
 
 FEW = under(KINDS[2], (0.2, 0.65), (0.18, 0.6))
-MORE = under(KINDS[2], (0.2, 0.3, 0.45, 0.7), (0.18, 0.35, 0.55, 0.75))
-STANDARD_FEW = GateLayout(STANDARD, (25,), (20, 80, 150))  # one gate alone on a side
-UNLIKE = under(
-    Kind("unlike", graded((32, 25, 19, 13, 6.3), 1165), other=STANDARD.chain),
-    (0.2, 0.3, 0.45, 0.7),
-    (0.18, 0.35, 0.55, 0.75),
-)
-LAYOUTS = {"few": FEW, "more": MORE, "standard, few": STANDARD_FEW, "unlike": UNLIKE}
-
-
-@cases
-def test_a_rig_that_is_wrong_in_one_thing_is_told_what_it_is(name, layout, size, size_mm):
-    """The rig is the bench's, made from a protocol file and not by what is tested."""
-    fault = next(one for one in WRONG_RIGS if one.name == name)
-    stated = parse(LAYOUTS[layout].protocol())
-    text = dict(fault.rigs(LAYOUTS[layout].protocol()))[size]
-    dials = read_dials({"quiet": "1"} | fault.settings(size))
-    one = case(parse(text), dials, run=9)
-    planned = {run.number: run for run in runs(stated)}
-    result = replace(one, protocol=stated, run=planned[one.run.number]).analyze()
-    assert judged(name, result) in {"right", "likely"}, result.reasons
-    named = [
-        fault_found
-        for reason in result.reasons
-        for fault_found in (*reason.values.get("candidates", ()), reason.json())
-        if fault_found["code"] in fault.codes
-    ]
-    assert named
-    if size_mm:  # of the likeliest
-        values = named[0]["values"]
-        assert abs(abs(values["size_m"]) * 1e3 - size_mm) < 2e3 * values["U95_m"]
-
-
-def test_what_may_as_well_be_nothing_is_no_fault():
-    """A drop that misses too much is better read from elsewhere, whatever was tried there."""
-    layout = under(next(kind for kind in KINDS if kind.name == "60 rods"), (0.2,), (0.18,))
-    result = case(parse(layout.protocol()), Dials(), seed=101, run=1).analyze()
-    assert result.verdict == "void"
-    assert codes(result) == ["edges_missed"]
 
 
 def test_a_top_rod_that_two_gates_missed_by_chance_still_hangs_there():

@@ -10,34 +10,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.studies.layout_catalogue import KINDS, under
 from rig.analysis.result import DropResult
 from rig.analysis.session import analyze
 from rig.analysis.verdict import _SURE, _air
 from rig.errors import InputError
 from rig.protocol.protocol import Accept, Gates
-from rig.protocol.reader import parse
 from rig.reasons import Reason, make_reason, plain_reason
-from rig.records import Certificate, Edge
-from rig.wordings import OPERATOR
+from rig.records import Edge
 from sim.dials import Dials
-from tests.analysis.drops import (
-    FENCE,
-    HZ,
-    SINGLE,
-    UNIFORM,
-    Case,
-    assert_true,
-    case,
-    codes,
-    with_dials,
-)
+from tests.analysis.drops import FENCE, HZ, SINGLE, UNIFORM, Case, case, codes, with_dials
 from tests.examples import examples
-from tests.tables import cases
 
 MILD = Dials(skew_sd=1e-3)
 QUIET = case(UNIFORM, Dials.quiet(), incline=40.0)
-IMPACT = {gate.channel for gate in UNIFORM.gates.on("impact")}
 
 
 def accepting(one: Case, **limits: float) -> Case:
@@ -84,27 +69,6 @@ def test_missed_edges_beyond_the_limit_are_void(rods, verdict):
     if verdict == "void":
         text = only_reason(result, "void").text
         assert text == "34 of 660 edges missed (5.2%), limit 5.0%"
-
-
-@cases
-def test_what_a_board_counted_is_judged(count, number, verdict, code):
-    certificate = Certificate(**{"events": 660, "crc32": 0, "overflows": 0, count: number})
-    result = replace(QUIET, drop=replace(QUIET.drop, certificate=certificate)).analyze()
-    assert (result.verdict, codes(result)) == (verdict, [code] if code else [])
-    assert all(str(number) in reason.text for reason in result.reasons)
-    assert result.audit.lost == (number if count == "overflows" else 0)
-    assert bool(result.quantities) == (verdict != "void")
-
-
-def test_edges_that_scatter_are_remarked_and_widen_the_uncertainty():
-    scene = parse(under(KINDS[2], (0.2, 0.65), (0.18, 0.6)).protocol())
-    calm, jittery = (case(scene, with_dials(jitter_sd=sd)).analyze() for sd in (0.0, 3e-4))
-    assert calm.verdict == "accepted"
-    assert only_reason(jittery, "marginal").code == "scatter"
-    assert jittery.scatter > 2.0
-    for name, measured in jittery.quantities.items():
-        assert measured.u > calm.quantities[name].u
-        assert abs(measured.value - calm.quantities[name].value) < measured.expanded
 
 
 # ---- records of another kind --------------------------------------------------------------------
@@ -168,37 +132,6 @@ def printable(result: DropResult) -> None:
     assert json.loads(text)["verdict"] == result.verdict
 
 
-@pytest.mark.parametrize("channel", [gate.channel for gate in UNIFORM.gates.gates[::14]])
-def test_a_dead_gate_is_said_and_harms_nothing_but_the_number_of_edges(channel):
-    one = case(UNIFORM, MILD, incline=40.0)
-    dead = one.with_edges([edge for edge in one.drop.edges if edge.channel != channel])
-    lenient = accepting(dead, missed_edges=0.2).analyze()
-    printable(lenient)
-    assert only_reason(lenient, "marginal").values["channel"] == channel
-    of_gate = {edge.kind for edge in lenient.unmatched if edge.channel == channel}
-    assert of_gate == {"dead gate"}
-    assert lenient.quantities.keys() == one.analyze().quantities.keys()
-    assert_true(lenient, one.truth)
-    result = dead.analyze()
-    missed = lenient.audit.missed / (lenient.audit.matched + lenient.audit.missed)
-    assert result.verdict == ("void" if missed > 0.05 else "marginal")
-    assert f"channel {channel} " in result.reasons[-1].text
-    assert result.audit == lenient.audit
-
-
-@pytest.mark.parametrize("role", ["impact", "free"])
-def test_a_dead_side_is_void(role):
-    keep = IMPACT if role == "free" else set(range(16)) - IMPACT
-    result = accepting(
-        QUIET.with_edges([edge for edge in QUIET.drop.edges if edge.channel in keep]),
-        missed_edges=1.0,
-    ).analyze()
-    unlike, dead = result.reasons
-    assert [unlike.code, dead.code] == ["few_edges_fit", "side_silent"]
-    assert unlike.values["side"] == dead.values["side"] == role
-    printable(result)
-
-
 # ---- sessions -----------------------------------------------------------------------------------
 
 
@@ -208,33 +141,6 @@ def attempts(*numbers: tuple[int, int]) -> list:
 
 def scale(drop):
     return case(SINGLE, MILD).scale
-
-
-def test_the_last_attempt_counts_and_the_rejected_do_not():
-    """Nor does one in either summary that would be void anyway."""
-    *drops, last = attempts((2, 1), (1, 2), (1, 1), (3, 1), (4, 1))
-    drops.append(replace(last, edges=last.edges[:50]))
-    slammed = [plain_reason("the door slammed", OPERATOR)]
-    told = []
-    found = analyze(
-        SINGLE, drops, scale, {(3, 1): slammed, (4, 1): slammed}, lambda *done: told.append(done)
-    )
-    assert told == [(n, 5) for n in range(1, 6)]
-    assert [(r.run.number, r.attempt) for r in found.runs] == [(1, 2), (2, 1), (3, 1), (4, 1)]
-    assert found.runs[3].verdict == "rejected"
-    assert [(r.run.number, r.attempt) for r in found.superseded] == [(1, 1)]
-    rejected = found.runs[2]
-    assert (rejected.verdict, rejected.reasons[0].text) == ("rejected", "the door slammed")
-    assert [line.n for line in found.summary] == [2]
-    assert [line.n for line in found.with_rejected] == [3]
-    said = found.json()
-    assert said["summary_with_rejected"][0]["n"] == 3
-    (first, second), third = ((run.quantities["speed_m_s"] for run in found.runs[:2]), rejected)
-    both = [found.summary[0], found.with_rejected[0]]
-    values = [first.value, second.value, third.quantities["speed_m_s"].value]
-    assert [line.means["speed_m_s"].value for line in both] == pytest.approx(
-        [sum(values[:2]) / 2, sum(values) / 3], rel=1e-12
-    )
 
 
 def test_a_run_that_is_not_planned_or_a_scene_without_gates_is_bad_input():

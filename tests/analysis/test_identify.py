@@ -9,19 +9,14 @@ import numpy as np
 import pytest
 from scipy.special import log_ndtr
 
-from bench.studies.coverage import COEFFICIENTS, draw_rigs
-from bench.studies.falls import falls
 from bench.studies.layout_catalogue import GateLayout, Kind, even
-from bench.studies.time_scales import time_scale
 from rig.analysis.annealing import MISSED, STRAYS
-from rig.analysis.drop import DropCase
 from rig.analysis.identify import LEAD, deciding_gate, pattern_faults
-from rig.protocol.plan import runs as planned
 from rig.protocol.protocol import Protocol
 from rig.protocol.reader import parse
 from rig.records import Edge
 from sim.dials import Dials
-from tests.analysis.drops import CLOCK_U, PROTOCOLS, STATED, Case, case
+from tests.analysis.drops import CLOCK_U, STATED, Case, case
 
 # Every reading there is ---------------------------------------------------------------------------
 
@@ -235,16 +230,3 @@ def test_a_further_gate_tells_what_one_cannot():
     assert again.log_odds > LEAD
     kept = [origin for n, origin in enumerate(whole.truth.edges) if n not in first]
     assert all(rod == kept[n][3] for n, rod in rods_in(again.drop, less).items())
-
-
-def test_steps_that_an_edge_at_an_impact_stops_are_begun_once_more(tmp_path):
-    rig = next(rig for rig in draw_rigs(str(PROTOCOLS), COEFFICIENTS, 20, 1) if rig.number == 12)
-    protocol = parse(rig.text)
-    runs = {run.number: run for run in planned(protocol)}
-    (fall,) = falls([rig.ask(tmp_path)._replace(runs=[[4]])])
-    result, fit = DropCase(protocol, runs[4], fall.drop, time_scale(rig.seed)).read()
-    assert fit.estimate.settled
-    assert result.verdict == "accepted"
-    for name in ("speed_m_s", "separation_raw_m"):
-        measured = result.quantities[name]
-        assert abs(measured.value - fall.truth[name]) < 1.5 * measured.expanded, name

@@ -6,20 +6,16 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
-from bench.studies.layout_catalogue import LAYOUTS, STANDARD, GateLayout
 from rig.analysis.budgets import Budgets
-from rig.analysis.components import LEAST_SHARE, above
+from rig.analysis.components import above
 from rig.analysis.equations import STRAY, linearize
 from rig.analysis.fit import alone as fit_alone
-from rig.analysis.joint_fit import FEWEST, by_itself, joint_fit
+from rig.analysis.joint_fit import by_itself, joint_fit
 from rig.analysis.quantities import measurands
 from rig.analysis.result import GOOD
 from rig.analysis.session import analyze
-from rig.protocol.plan import runs as planned_runs
-from rig.protocol.reader import parse
 from sim.lab import ChainLab
-from tests import tables
-from tests.analysis.drops import STATED, UNIFORM, assert_true, case, with_dials
+from tests.analysis.drops import UNIFORM, case
 from tests.analysis.sessions import MILD, analysis, cases, fit_session, fits
 
 FOUR = (1, 2, 3, 4)
@@ -232,39 +228,3 @@ def test_a_release_near_the_limit_is_judged_by_what_all_runs_say_of_it():
     assert (among.runs[n].verdict in GOOD) is (sizes[1] < sizes[0])
     assert ((latest.run.number, 1) in among.adjusted) is (sizes[1] < sizes[0])
     assert among.runs[n].learned
-
-
-# A pitch and half a width up: each edge may be before an impact or after it, as the rig is.
-BETWEEN = (22, 42.05, 55.03, 130, 204, 350, 690, 1078)
-FEW = {f"{one.kind.name}: {one.heights}": one for one in LAYOUTS} | {
-    "passed while others strike": GateLayout(
-        STANDARD, BETWEEN, (20, 60, 100, 140, 204, 350, 690, 1078)
-    )
-}
-
-
-@tables.cases
-def test_where_little_scatters_and_few_gates_tell_of_it_the_joint_fit_settles(layout, dial):
-    """What hardly a degree of freedom tells is near what was stated, and does not jump there."""
-    protocol = parse(FEW[layout].protocol())
-    numbers = [run.number for run in planned_runs(protocol)][:6]
-    drops = [case(protocol, with_dials(**dial), run=number) for number in numbers]
-    found = analysis(drops)
-    assert found.joint is not None
-    assert found.joint.settled
-    assert [result.learned for result in found.runs] == [True] * len(numbers)
-    for name in STATED.__slots__:
-        least = LEAST_SHARE * getattr(STATED, name)
-        assert getattr(found.joint.components, name) >= least * (1.0 - 1e-12), name
-    for one, result in zip(drops, found.runs, strict=True):
-        assert_true(result, one.truth, 2.0)
-
-
-def test_few_drops_teach_nothing():
-    drops = cases(FOUR)
-    some = drops[: FEWEST - 1]
-    few = analysis(some)
-    assert few.joint is None
-    assert not any(result.learned for result in few.runs)
-    assert [r.quantities for r in few.runs] == [one.analyze().quantities for one in some]
-    assert "learned" not in few.json()

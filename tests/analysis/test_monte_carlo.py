@@ -25,12 +25,6 @@ def test_both_ways_agree():
         assert propagated.low < measured.value < propagated.high
 
 
-def test_a_seed_is_kept():
-    (fit,) = fits(cases((1,), seed=6, scene="fence"))
-    one, same, other = (monte_carlo(fit, 5, seed) for seed in (3, 3, 4))
-    assert one == same != other
-
-
 @pytest.mark.parametrize("shift", [0.0, 0.3])
 def test_intervals_agree_as_their_ends_do(shift):
     """Half a unit of the first digit of u is 12.5 % of u here; 10⁶ trials are good for 0.5 %."""

@@ -9,9 +9,7 @@ import pytest
 
 from rig.analysis.gate_passages import moment
 from rig.analysis.quantities import AdjustedDrop
-from rig.analysis.session import analyze
 from rig.protocol import reader
-from rig.protocol.plan import runs
 from rig.records import Edge
 from rig.units import Quantity
 from sim.dials import Dials
@@ -109,25 +107,6 @@ def test_an_object_let_go_by_hand_needs_only_a_drop_that_is_known_less_well():
     assert abs(accelerated(wide).value - BALL.gravity.value) <= accelerated(wide).expanded
 
 
-def test_runs_are_averaged_gate_by_gate():
-    cases = {run.number: case(BALL, Dials(), run=run.number, seed=1) for run in runs(BALL)}
-    drops = [one.drop for one in cases.values()]
-    # One run in which the second gate saw nothing: two intervals less.
-    first = drops[0]
-    drops[0] = replace(first, edges=tuple(edge for edge in first.edges if edge.channel != 1))
-    found = analyze(BALL, drops, lambda drop: cases[drop.run].scale)
-    (line,) = found.summary
-    seen = [one for run in found.runs for one in run.gates if one.channel == 2]
-    at = {one.mean.channel: one for one in line.gates}
-    assert list(at) == [0, 1, 2, 3]
-    assert (at[1].n, at[2].n) == (line.n - 1, line.n)
-    assert at[2].speed_sd == pytest.approx(np.std([s.speed.value for s in seen], ddof=1))
-    since = [one.interval.value for one in seen if one.interval is not None]
-    assert len(since) == line.n - 1
-    assert at[2].mean.interval.value == pytest.approx(np.mean(since))
-    assert at[2].interval_sd == pytest.approx(np.std(since, ddof=1))
-
-
 LOWEST = BALL.gates.gates[-1]
 ONE_GATE = BALL.with_gates([LOWEST])
 
@@ -218,14 +197,6 @@ def test_all_gates_on_one_channel_are_no_fall_past_one_gate():
     result = imported(ONE_GATE, edges).analyze()
     assert result.verdict == "void"
     assert result.audit.unexplained >= 2 * (len(BALL.gates.gates) - 1)
-
-
-@pytest.mark.parametrize("channels", [(0,), (3,), (0, 2)])
-def test_the_edges_of_silent_gates_are_missed(channels):
-    one = case(BALL, Dials(), run=1, seed=1)
-    result = one.with_edges(e for e in one.drop.edges if e.channel not in channels).analyze()
-    assert result.audit.missed >= 2 * len(channels)
-    assert result.verdict == ("marginal" if len(channels) == 1 else "void")
 
 
 @pytest.mark.parametrize(("pulses", "verdict"), [(0, "accepted"), (1, "marginal"), (3, "void")])

@@ -13,7 +13,7 @@ from rig.analysis.summary import summarize
 from rig.model.chain import Chain
 from rig.protocol.plan import runs
 from rig.units import Quantity
-from tests.analysis.drops import FENCE, SINGLE, UNIFORM, made_up
+from tests.analysis.drops import UNIFORM, made_up
 
 REFERENCE = {
     40.0: (0.11546810526538031, 6.9327596650855757),
@@ -62,30 +62,6 @@ def results(protocol, values: dict[float, list[float]], verdict="accepted") -> l
     return found
 
 
-def test_inclines_come_in_order_and_only_good_runs_count():
-    drops = results(UNIFORM, {80.0: [0.010], 40.0: [0.113, 0.114, 0.118]})
-    drops[-1] = replace(drops[-1], verdict="marginal")
-    for bad in ("void", "rejected"):
-        drops += results(UNIFORM, {60.0: [0.5], 40.0: [0.5]}, bad)
-    first, second = summarize(UNIFORM, drops)
-    assert [(line.condition.incline_deg, line.n) for line in (first, second)] == [
-        (40.0, 3),
-        (80.0, 1),
-    ]
-    assert first.means["separation_m"].value == pytest.approx(0.115)
-    assert first.deviations["separation_m"] == pytest.approx(math.sqrt(7e-6), rel=1e-9)
-    assert first.deviations["speed_m_s"] == pytest.approx(50 * math.sqrt(7e-6), rel=1e-9)
-    assert second.deviations == {}
-    for line in (first, second):
-        separation, speed = REFERENCE[line.condition.incline_deg]
-        assert line.predicted["separation_m"].value == pytest.approx(separation, rel=1e-12)
-        assert line.predicted["speed_m_s"].value == pytest.approx(speed, rel=1e-8)
-    # At 40°: 3.5 mm for β ± 0.05, 4.6 mm for μ ± 0.05 (here 0.02), 0.3 mm for 10 mm (here 2 mm).
-    u = math.hypot(3.5e-3, 4.6e-3 * 0.4, 0.3e-3 * 0.2)
-    assert first.predicted["separation_m"].u == pytest.approx(u, rel=0.02)
-    assert summarize(UNIFORM, []) == ()
-
-
 def test_outside_the_model_there_is_nothing_to_compare_with():
     """Eq. 13 is singular for slender rods on a steep enough friction."""
     chain = replace(UNIFORM.chains["A"].chain, inertia=0.01)
@@ -117,27 +93,6 @@ def test_top_rods_of_unlike_chains_start_apart():
     assert {
         line.condition.impact_chain: line.predicted["separation_m"].value for line in lines
     } == by_chain
-
-
-def test_like_chains_make_one_result():
-    """B differs in what no result depends on."""
-    b = replace(UNIFORM.chains["A"], name="B", position_u=0.001)
-    protocol = replace(UNIFORM, chains={**UNIFORM.chains, "B": b})
-    (line,) = summarize(protocol, results(protocol, {40.0: [0.1, 0.1]}))
-    assert line.n == 2
-    assert "impact_chain" not in line.json()
-
-
-def test_one_chain_is_compared_by_its_speed_a_fence_by_gravity():
-    drop = made_up(runs(SINGLE)[0], speed_m_s=measured(6.9, 0.01))
-    (line,) = summarize(SINGLE, [drop])
-    assert set(line.predicted) == set(line.means) == {"speed_m_s"}
-    assert line.predicted["speed_m_s"].value == pytest.approx(REFERENCE[40.0][1], rel=1e-12)
-    bars = made_up(runs(FENCE)[0], gravity_m_s2=measured(9.8, 0.01))
-    (line,) = summarize(FENCE, [bars])
-    assert line.predicted == {"gravity_m_s2": FENCE.gravity}
-    t = 1.964719837  # of 500 degrees of freedom
-    assert line.normalized_error("gravity_m_s2") == pytest.approx(-0.01 / (t * 0.01), rel=1e-6)
 
 
 def difference(some, reference):

@@ -11,14 +11,13 @@ from rig.analysis.components import Components, priors
 from rig.design.cases import BEAM, cases
 from rig.design.forecast import Forecast, GateLayout, forecast
 from rig.design.search import Room, better, score
-from rig.design.trials import DROPS, Trials, readable, trials, trials_text
+from rig.design.trials import Trials, readable, trials, trials_text
 from rig.estimate.coefficients import best, coefficient_problem
 from rig.estimate.hypotheses import model_alpha
 from rig.estimate.quadratic_forms import merge_like
 from rig.protocol import reader
 from rig.protocol.protocol import Condition, Gate, Gates, Plan, Priors, Protocol
 from rig.protocol.reader import parse
-from rig.ready import find_protocol
 from rig.vocabulary import OBJECT, TWO_CHAINS
 from tests.analysis.drops import SINGLE, UNIFORM
 from tests.analysis.test_datum_board import from_board, raised
@@ -76,17 +75,6 @@ def test_the_forecast_of_coefficients_is_what_the_estimate_then_states(expected)
         assert u == pytest.approx(found[name].u, rel=0.2), name
 
 
-def test_one_incline_tells_no_friction_and_the_restitution_only_with_it_held():
-    """As `rig estimate` has it of such a session."""
-    protocol = replace(UNIFORM, plan=Plan((40.0,), 4))
-    found = foretold(protocol, analysis((40.0,), 4).joint.components)
-    problem = coefficient_problem(protocol, merge_like(forms((40.0,), 4)))
-    assert found.held == set(problem.held) == {"friction"}
-    u = pytest.approx(best(protocol, problem)["restitution"].u, rel=0.2)
-    assert found.coefficients.keys() - found.held == {"restitution"}
-    assert found.coefficients["restitution"] == u
-
-
 LOW = placed(SINGLE, [0.02, 0.044, 0.056, 0.084])
 
 
@@ -97,12 +85,6 @@ def test_low_beams_alone_are_read_too():
     steep = parse(from_board(raised(UNIFORM.text, 25.0)).replace("10 deg, 40 deg, 50", "60"))
     assert readable(steep)
     assert trials(LOW, 6) == Trials(6, 6)
-
-
-def test_trial_drops_are_let_go_when_a_board_lets_go():
-    """A rig that records from its release on has no drop that was let go before."""
-    ball = reader.read(find_protocol("falling-ball"))
-    assert trials(ball) == Trials(DROPS, DROPS)
 
 
 def test_trials_that_fail_name_the_side_and_a_gate():
