@@ -71,42 +71,6 @@ def test_missed_edges_beyond_the_limit_are_void(rods, verdict):
         assert text == "34 of 660 edges missed (5.2%), limit 5.0%"
 
 
-# ---- records of another kind --------------------------------------------------------------------
-
-
-def other_channels(one: Case, order) -> list[Edge]:
-    """The edges, the channels of which are in another order."""
-    channels = [edge.channel for edge in one.drop.edges]
-    return [e._replace(channel=c) for e, c in zip(one.drop.edges, order(channels), strict=True)]
-
-
-def shuffled(channels: list[int]) -> list[int]:
-    return random.Random(1).sample(channels, len(channels))
-
-
-def turned_over(channels: list[int]) -> list[int]:
-    there = sorted(set(channels))
-    return [there[~there.index(channel)] for channel in channels]
-
-
-WRONG = {
-    "upside down": lambda one: [e._replace(blocked=not e.blocked) for e in one.drop.edges],
-    "backwards": lambda one: [Edge(-e.tick, e.channel, not e.blocked) for e in one.drop.edges],
-    "half the speed": lambda one: [e._replace(tick=2 * e.tick) for e in one.drop.edges],
-    "channels shuffled": lambda one: other_channels(one, shuffled),
-    "gates the other way up": lambda one: other_channels(one, turned_over),
-}
-
-
-@pytest.mark.parametrize("change", WRONG.values(), ids=WRONG)
-def test_what_is_no_fall_of_this_chain_is_void(change):
-    fence, uniform = (case(scene, MILD) for scene in (FENCE, UNIFORM))
-    assert fence.with_edges(change(fence)).analyze().verdict == "void"
-    result = uniform.with_edges(change(uniform)).judge()
-    assert result.verdict == "void"
-    assert result.reasons
-
-
 # ---- little to go by ----------------------------------------------------------------------------
 
 

@@ -37,14 +37,13 @@ def shadow_s(one: Case, number: int) -> float:
     return same[at + 1] - when if blocked else when - same[at - 1]
 
 
-@pytest.mark.parametrize("seed", [1, 3])
-def test_each_edge_has_the_cause_that_it_has(seed):
+def test_each_edge_has_the_cause_that_it_has():
     """Everything at once, every dial at its default but twice as many faults of edges."""
     one = case(
         UNIFORM,
         Dials(skew_sd=1e-3, missed=0.02, chatter=0.01, string=0.004, bounce=0.1),
         incline=40.0,
-        seed=seed,
+        seed=1,
     )
     result = one.analyze()
     consistent(result)

@@ -49,8 +49,8 @@ def test_how_much_edges_scatter_is_seen_and_not_taken_for_granted():
     assert u[1] < 1.1 * u[0]
 
 
-@pytest.mark.parametrize("wrong", [-3000e-6, 3000e-6])
-def test_a_wrong_clock_shows_twice(wrong):
+def test_a_wrong_clock_shows_twice():
+    wrong = 3000e-6
     one = case(UNIFORM, QUIET, incline=40.0)
     shown = gravity(one, TimeScale(HZ * (1.0 + wrong), 1e-6)).value
     assert shown / UNIFORM.gravity.value - 1.0 == pytest.approx(2.0 * wrong, rel=0.01)

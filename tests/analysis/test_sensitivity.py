@@ -6,21 +6,21 @@ import pytest
 
 from rig.analysis import sensitivity
 from rig.analysis.sensitivity import FACTOR, prior_sensitivity
-from tests.analysis.drops import UNIFORM
+from tests.analysis.drops import FENCE
 from tests.analysis.sessions import MILD, analysis, cases
 
 
 def test_a_prior_moves_results_as_a_protocol_that_states_it_so(monkeypatch):
     # Joint fits of further priors take long.
     priors = sensitivity._priors
-    name = "datum_uncertainty"
+    name = "height_uncertainty"
     monkeypatch.setattr(sensitivity, "_priors", lambda p: {name: priors(p)[name]})
-    drops = cases((1, 2, 3, 4), MILD, 3)
+    drops = cases((1, 2, 3, 4), MILD, 3, "fence")
     found = analysis(drops)
-    rows = [row for row in prior_sensitivity(UNIFORM, found) if row["prior"] == "datum_uncertainty"]
-    assert {row["quantity"] for row in rows} == {"separation_m", "speed_m_s"}
+    rows = [row for row in prior_sensitivity(FENCE, found) if row["prior"] == name]
+    assert {row["quantity"] for row in rows} == {"gravity_m_s2"}
     for word, factor in (("wider", FACTOR), ("narrower", 1.0 / FACTOR)):
-        other = replace(UNIFORM, gates=replace(UNIFORM.gates, datum_u=0.3e-3 * factor))
+        other = replace(FENCE, gates=replace(FENCE.gates, height_u=0.3e-3 * factor))
         (line,) = analysis(drops, other).summary
         (here,) = found.summary
         for row in rows:

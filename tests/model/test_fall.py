@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 from mpmath import mp
 
@@ -42,6 +42,7 @@ ALL_GRAVITIES = st.one_of(st.just(0.0), GRAVITIES)
 
 @examples(150)
 @given(chains(), ALPHAS, GAMMAS, DROPS, ALL_GRAVITIES, SPEEDS)
+@example(even_chain(3, 0.5), 0.1, 1.0, 0.2, 1e-200, 0.0)  # of its own size is the speed alone
 def test_agrees_with_the_second_implementation(chain, alpha, gamma, drop, gravity, speed):
     assume(gravity or speed)
     end = fall(chain, alpha, gamma, drop, gravity, speed)

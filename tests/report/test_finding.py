@@ -5,13 +5,12 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from rig.analysis.result import Measured
-from rig.analysis.session import Analysis
 from rig.protocol import reader
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Gate, Run
 from rig.reasons import make_reason, plain_reason, remedies
 from rig.records import Drop, Edge
-from rig.report.finding import NONE, deviations, finding, headline, verdict, void_lines
+from rig.report.finding import NONE, deviations, finding, headline, verdict
 from rig.report.templates import lines
 from rig.report.timeline import lanes, timeline
 from rig.session.reading import StateEntry
@@ -132,7 +131,6 @@ def void(run, attempt, *reasons, verdict="void"):
 
 
 SKEW = make_reason("release_skew", skew_s=9.19e-3, limit_s=5e-3)
-MISSED = make_reason("edges_missed", missed=34, expected=660, limit=0.05)
 MOTHS = plain_reason("moths")
 
 
@@ -145,17 +143,6 @@ def test_each_void_has_a_remedy_and_the_general_one_only_where_nothing_else_is_k
     ]
     (general,) = remedies([MOTHS, plain_reason("a lorry")])
     assert remedies([MOTHS, SKEW, SKEW]) == remedies([SKEW]) != [general]
-
-
-def test_void_drops_of_one_reason_share_a_line_above_what_to_do():
-    last = void(2, 1, SKEW, MISSED), void(3, 2, verdict="accepted"), void(4, 1, MOTHS)
-    lines = void_lines(Analysis(last, (void(3, 1, SKEW),), ()))
-    assert lines[1:4] == [f"  runs 2, 3: {SKEW}", f"  run 2: {MISSED}", "  run 4: moths"]
-    worse = make_reason("release_skew", skew_s=20e-3, limit_s=5e-3)
-    again = void_lines(Analysis((void(2, 2, worse),), (void(2, 1, SKEW),), ()))
-    assert again[1] == "  run 2 (attempts 1–2): release skew"
-    assert [line.strip() for line in lines[5:]] == remedies([SKEW, MISSED])
-    assert void_lines(Analysis((void(1, 1, verdict="marginal"),), (), ())) == []
 
 
 def test_air_that_may_be_none_is_not_mentioned():

@@ -19,17 +19,14 @@ from rig.results.whole import complete_analysis, protocol_of, results
 from rig.sections import Sections
 from rig.session.store import Session
 from rig.units import Quantity
-from tests.cli.lab import PROTOCOLS, record
+from tests.analysis.kept_results import FOLDER
 from tests.tables import cases
 
 
 @pytest.fixture(scope="module")
-def single(tmp_path_factory):
-    """Make a session of a single chain with four good drops."""
-    text = (PROTOCOLS / "single-chain.yaml").read_text("utf-8")
-    text = text.replace("{incline: 40 deg, repeats: 12, settle: 10 s}",
-                        "{incline: [40 deg, 60 deg], repeats: 2, settle: 1 s}")  # fmt: skip
-    return record(tmp_path_factory.mktemp("single"), text)
+def single():
+    """A session of a single chain with two good drops."""
+    return FOLDER / "single.session"
 
 
 @pytest.fixture(scope="module")

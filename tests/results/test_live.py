@@ -26,20 +26,14 @@ from rig.session.schema import RunState
 from rig.session.store import Session
 from sim.dials import Dials
 from tests.analysis.drops import UNIFORM, case
+from tests.analysis.kept_results import FOLDER
 from tests.analysis.sessions import analysis
-from tests.cli.lab import record, short
-
-
-@pytest.fixture(scope="module")
-def blocks(tmp_path_factory):
-    """Six drops, the first four of them a block of A, B, B, A."""
-    text = short("[40 deg]", 6).replace("settle", "order: ABBA, settle")
-    return record(tmp_path_factory.mktemp("blocks"), text, "sim://?seed=5")
 
 
 @pytest.fixture
-def session(blocks, tmp_path):
-    return shutil.copy(blocks, tmp_path / "copy.session")
+def session(tmp_path):
+    """Eight drops, each four of them a block of A, B, B, A."""
+    return shutil.copy(FOLDER / "unlike.session", tmp_path / "copy.session")
 
 
 def reject(path, *runs):
@@ -54,18 +48,18 @@ def whole(path):
         return complete_analysis(session)
 
 
-@pytest.mark.parametrize("rejected", [(6,), (2, 3, 4)])
+@pytest.mark.parametrize("rejected", [(6,), (2, 3, 4, 5, 6, 7, 8)])
 def test_all_drops_together_say_what_rig_analyze_says(session, rejected):
     """Of one good drop alone nothing is fitted jointly; that is summed up likewise."""
     reject(session, *rejected)
     live = LiveAnalysis(session)
     view = live.read()
-    assert view.lagging == (6 - len(rejected) >= FEWEST)
+    assert view.lagging == (8 - len(rejected) >= FEWEST)
     if view.lagging:
         alone = view.analysis.summary
         live.fit_jointly(view)
         view = live.read()
-        assert (view.fitted, view.lagging) == (6 - len(rejected), False)
+        assert (view.fitted, view.lagging) == (8 - len(rejected), False)
         assert view.analysis.summary != alone
     assert view.analysis.json() == whole(session).json()
     assert view.analysis.with_rejected
@@ -79,7 +73,7 @@ def test_the_first_reading_of_a_session_whose_results_are_kept_has_them_all(sess
     monkeypatch.setattr(DropCase, "read", None)
     monkeypatch.setattr("rig.analysis.session.joint_fit", None)
     view = LiveAnalysis(session).read()
-    assert (view.fitted, view.lagging) == (6, False)
+    assert (view.fitted, view.lagging) == (8, False)
     assert view.analysis.json() == said
     assert view.results == cold.results
     assert not view.analysis.with_rejected

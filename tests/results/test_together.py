@@ -11,6 +11,7 @@ from rig.errors import InputError, SessionError
 from rig.protocol import reader
 from rig.results.together import SessionPart, results_together, same_owners
 from rig.session.store import Session
+from tests.analysis.kept_results import FOLDER
 from tests.cli.lab import PROTOCOLS, record
 from tests.session.altering import alter
 from tests.tables import cases
@@ -23,11 +24,10 @@ def record_few(folder, name, scene="picket-fence", seed=1, series=0, change=("",
     return record(folder, text, f"sim://?stated=1&missed=0&seed={seed}&series={series}", name)
 
 
-@pytest.fixture(scope="module")
-def two(tmp_path_factory):
+@pytest.fixture
+def two():
     """Two sessions of a fence, on two rigs."""
-    folder = tmp_path_factory.mktemp("two")
-    return record_few(folder, "a", seed=1), record_few(folder, "b", seed=2)
+    return FOLDER / "rig-1.session", FOLDER / "rig-2.session"
 
 
 def together(*paths, **options):
@@ -41,9 +41,9 @@ def together(*paths, **options):
 
 def test_runs_of_both_count_in_one_mean_and_keep_their_sessions_names(two, call):
     said = json.loads(call("analyze", *two, "--json").out)
-    assert [run["session"] for run in said["runs"]] == ["a.session"] * 4 + ["b.session"] * 4
+    assert [run["session"] for run in said["runs"]] == ["rig-1.session"] * 4 + ["rig-2.session"] * 4
     (line,) = said["summary"]
-    assert line["sessions"] == ["a.session", "b.session"]
+    assert line["sessions"] == ["rig-1.session", "rig-2.session"]
     assert line["n"] == 8
     values = [run["gravity_m_s2"]["value"] for run in said["runs"]]
     assert line["gravity_m_s2"]["value"] == pytest.approx(sum(values) / 8)
@@ -64,7 +64,7 @@ def test_what_one_rig_shares_is_one_unknown_and_of_two_rigs_there_are_two(two):
         for same in (True, False)
     )
     assert {"beams", "datum", "drop", "clock"} <= set(one)
-    assert {f"{name} ({place}.session)" for name in one for place in "ab"} == set(each)
+    assert {f"{name} (rig-{number}.session)" for name in one for number in (1, 2)} == set(each)
 
 
 def test_errors_of_one_rig_cancel_in_the_difference_of_its_sessions(tmp_path):

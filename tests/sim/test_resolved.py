@@ -1,6 +1,5 @@
 """Resolved falls by their own physics: nothing here comes from the model but what it predicts."""
 
-import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -12,9 +11,7 @@ from bench.studies.published_falls import folded_time
 from rig.errors import InputError
 from rig.link.messages import pack_label
 from rig.model.impact import alpha_inclined, alpha_level, gamma_finite
-from rig.ports import truth_file
 from rig.protocol import reader
-from rig.runner import Operator, run_protocol
 from sim import resolved_lab
 from sim.dials import ResolvedDials
 from sim.resolved import foresight
@@ -266,17 +263,6 @@ def test_a_drop_comes_out_the_same_again_alone_and_made_ahead(dropped):
     twin.make_ahead(labels)
     twin.let_fall = None  # whatever falls now
     assert [twin.drop(label) for label in labels] == edges[::-1]
-
-
-def test_a_session_runs_and_keeps_the_truth(scene, tmp_path):
-    one = tmp_path / "one.yaml"
-    text = Path(scene).read_text().replace("repeats: 2", "repeats: 1")
-    one.write_text(text.replace("incline: 40 deg", "incline: 80 deg"))  # soon analysed
-    path = tmp_path / "one.session"
-    url = "sim://?dynamics=resolved&quiet=1&yaw_sd=1 deg"
-    run_protocol(str(one), url, str(path), Operator(lambda _: None), 3)
-    (truth,) = [json.loads(line) for line in truth_file(path).read_text().splitlines()]
-    assert (truth["run"], truth["attempt"]) == (1, 1)
 
 
 def test_a_fall_that_would_take_minutes_is_refused_and_a_long_one_told_of(
