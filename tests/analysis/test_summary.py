@@ -10,15 +10,9 @@ from rig.analysis.averages import combine, mean
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.result import DropResult, Measured
 from rig.analysis.summary import summarize
-from rig.model.chain import Chain
 from rig.protocol.plan import runs
 from rig.units import Quantity
 from tests.analysis.drops import UNIFORM, made_up
-
-REFERENCE = {
-    40.0: (0.11546810526538031, 6.9327596650855757),
-    80.0: (0.0098142050953198042, 5.25798131),
-}
 
 
 def measured(value: float, own: float, common: float = 0.0) -> Measured:
@@ -72,27 +66,6 @@ def test_outside_the_model_there_is_nothing_to_compare_with():
     assert line.predicted == {}
     assert line.json()["normalized_error"] is None
     assert line.json()["predicted"] == {}
-
-
-def test_top_rods_of_unlike_chains_start_apart():
-    """The free chain's extra length is there from the beginning; each run has its own."""
-    a = UNIFORM.chains["A"]
-    longer = replace(a, chain=Chain(a.chain.masses, tuple(z * 1.2 for z in a.chain.heights)))
-    protocol = replace(UNIFORM, chains={"A": a, "B": longer})
-    drops = results(protocol, {40.0: [0.1, 0.1]})
-    by_chain = {}
-    for drop in drops:
-        (line,) = summarize(protocol, [drop])
-        by_chain[drop.run.impact] = line.predicted["separation_m"].value
-    assert set(by_chain) == {"A", "B"}
-    assert by_chain["A"] == pytest.approx(REFERENCE[40.0][0] + 0.2 * 1.165, rel=1e-12)
-    assert by_chain["B"] < 0.0
-    # Together they stay two results: one mean of both would be of nothing that fell.
-    lines = summarize(protocol, drops)
-    assert [line.json()["impact_chain"] for line in lines] == ["A", "B"]
-    assert {
-        line.condition.impact_chain: line.predicted["separation_m"].value for line in lines
-    } == by_chain
 
 
 def difference(some, reference):
