@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from rig.analysis.comparison import compare
+from rig.analysis.curves import model_curves
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.result import Deviation, Measured, good_runs
 from rig.units import Quantity
@@ -82,3 +83,9 @@ def test_what_the_protocol_states_of_coefficients_counts_once():
             one for one in whole["speed_m_s"].differences if one.condition == line.condition
         ]
         assert line.differences["speed_m_s"] == other
+
+
+def test_curves_of_exact_coefficients_have_no_width():
+    known = replace(EXACT, drop=Quantity(0.18), gravity=Quantity(9.81))
+    curves = model_curves(replace(known, surface=replace(EXACT.surface, pile=None)))
+    assert {*curves["separation_U95_m"], *curves["speed_U95_m_s"]} == {0.0}

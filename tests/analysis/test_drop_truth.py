@@ -51,7 +51,7 @@ def test_a_perfect_rig_measures_the_truth(scene, incline):
         assert 5 * rounding < 0.01
 
 
-@pytest.mark.parametrize("seed", range(1, 31))
+@pytest.mark.parametrize("seed", range(1, 16))
 def test_any_scene_is_read(seed):
     """Rods from one to 60, alike or not, their α given or not; gates few or many, high or low."""
     drawn = scene(seed).protocol

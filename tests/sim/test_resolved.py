@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.studies.published_falls import folded_time
 from rig.errors import InputError
 from rig.link.messages import pack_label
 from rig.model.impact import alpha_inclined, alpha_level, gamma_finite
@@ -178,11 +177,6 @@ def test_rods_that_brush_each_other_on_the_way_down_have_not_landed():
     assert apart[early].min() < DIAMETER  # they met in the air
     assert found.touched_s.min() > math.sqrt(2 * DROP / GRAVITY)
     assert np.nanmin(found.touched_height) < 5e-3
-
-
-def test_a_folded_chain_falls_as_calkin_and_march_found():
-    """Their T/T_ff = 0.8472 is of a smooth chain; many rods come near, as one over their number."""
-    assert 2 * folded_time(80) - folded_time(40) == pytest.approx(0.8472, rel=0.01)
 
 
 @pytest.mark.parametrize("touching", [None, Bounce(0.5, 1e-5, 0.3)])
