@@ -1,4 +1,4 @@
-"""The live analysis says what the whole one does; a better measurement brings what was promised."""
+"""The live analysis says what the whole one does, and what a better input would bring."""
 
 import math
 import shutil
