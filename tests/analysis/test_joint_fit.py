@@ -198,22 +198,6 @@ def test_a_drop_that_does_not_go_with_the_others_stays_by_itself():
         assert one.quantities == other.quantities
 
 
-def test_a_verdict_is_on_a_drop_by_itself_and_a_bad_one_teaches_nothing():
-    drops = cases((*FOUR, 5))
-    alone = [one.analyze() for one in drops]
-    bad = drops[3].with_edges(drops[3].drop.edges[::3])
-    found = analysis([*drops[:3], bad, drops[4]])
-    for n, (result, single) in enumerate(zip(found.runs, alone, strict=True)):
-        if n == 3:
-            assert (result.verdict, result.learned) == ("void", False)
-        else:
-            assert (result.verdict, result.reasons) == (single.verdict, single.reasons)
-            assert result.learned
-    rejected = analysis(drops, UNIFORM, {(3, 1): ("the door slammed",)})
-    assert [r.learned for r in rejected.runs] == [True] * 2 + [False] + [True] * 2
-    assert len(rejected.joint.drops) == 4
-
-
 def test_a_release_near_the_limit_is_judged_by_what_all_runs_say_of_it():
     drops = cases(FOUR)
     runs = analysis(drops).runs
