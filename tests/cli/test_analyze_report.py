@@ -119,10 +119,3 @@ def test_a_budget_adds_up_and_agrees_with_its_trials(call, finished):
     assert "by itself u" in call("analyze", finished.session, "--budget", 1).out
     assert "_m" not in table  # symbols, not names of JSON members
     assert max(map(len, table.splitlines())) <= 80
-
-
-@cases
-def test_what_is_no_run_or_no_number_of_trials_is_bad_input(call, finished, words, said):
-    done = call("analyze", finished.session, "--budget", *words, code=2)
-    assert done.out == ""
-    assert said in done.err

@@ -302,11 +302,3 @@ def test_notes_and_files_are_appended_and_travel(fences, call, tmp_path):
     call("verify", session)
     call("recover", session, "-o", tmp_path / "saved.session")
     assert "rig µ.jpg" in call("verify", tmp_path / "saved.session").out
-
-
-@cases
-def test_what_cannot_be_noted_or_attached_is_said(words, said, fences, call, tmp_path):
-    session = tmp_path / "my.session"
-    shutil.copy(fences, session)
-    assert said in call(words[0], session, *words[1:], code=2).err
-    assert session.read_bytes() == fences.read_bytes()

@@ -30,20 +30,6 @@ def told(call):
     return words
 
 
-@pytest.mark.parametrize("name", [".", "no/such/folder/file", "text"])
-def test_a_run_does_not_overwrite_another_file(told, tmp_path, protocol, name):
-    """What else is no session is for tests/session."""
-    (tmp_path / "text").write_text("just words\n", "utf-8")
-    kept = {path: path.read_bytes() for path in tmp_path.iterdir()}
-    for port in ("sim://", "/dev/nonexistent"):
-        told("run", protocol, "--port", port, "--session", tmp_path / name)
-    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == kept
-
-
-def test_a_simulation_without_its_protocol_is_bad_input(told, protocol, tmp_path):
-    told("run", protocol, "--port", "sim://?protocol=/no/such/file", "--session", tmp_path / "s")
-
-
 @cases
 def test_a_port_that_cannot_be_opened_is_device_trouble(
     told, protocol, tmp_path, port, said, monkeypatch

@@ -78,9 +78,13 @@ def test_examples_are_commands(line):
 
 
 @cases
-def test_a_mistake_is_named_and_nothing_is_written(call, words, said, tmp_path, monkeypatch):
-    (tmp_path / "there.yaml").touch()
+def test_a_mistake_is_named_and_nothing_is_written(
+    call, words, said, finished, tmp_path, monkeypatch
+):
+    finished.copy(tmp_path)
+    (tmp_path / "there.yaml").write_text("just words\n", "utf-8")
     monkeypatch.chdir(tmp_path)
-    done = call(*words, code={2, 4})
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    done = call(*words, code=4 if said.startswith("cannot open") else 2)
     assert (done.out, said in done.err) == ("", True), done
-    assert [path.name for path in tmp_path.iterdir()] == ["there.yaml"]
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before

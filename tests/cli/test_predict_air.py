@@ -14,7 +14,7 @@ from sim.dials import Dials
 from sim.lab import ChainLab
 from tests.cli.lab import PROTOCOLS, short
 from tests.refusals import refused
-from tests.tables import cases, protocol_text
+from tests.tables import protocol_text
 
 TIGHT = 1e-13
 MASSES = (0.0241, 0.0203, 0.0162, 0.0131, 0.0108, 0.0089, 0.0072, 0.0060)
@@ -99,20 +99,6 @@ def test_uncertain_speed_and_drag_widen_the_prediction(predict):
         )
         # First order; c goes as the terminal speed to the power of −2.
         assert unsure["speed_u_m_s"] == pytest.approx(abs(high - low) / 2, rel=0.03)
-
-
-@cases
-def test_keys_that_exclude_each_other_are_found_at_their_place(line, start):
-    """What else may be wrong with a key is for tests/protocol."""
-    (problem,) = refused(InputError, "", parse, f"{SCENE}{line}\n", "f").problems
-    assert str(problem).startswith(start)
-
-
-def test_a_coefficient_needs_masses_and_sizes():
-    text = SCENE.replace(", mass: 10 g, diameter: 8 mm, rod_length: 90 mm", "")
-    with pytest.raises(InputError, match="needs mass, diameter, rod_length of A"):
-        parse(text + "drag: {coefficient: 1}\n")
-    assert parse(text + "drag: {terminal_speed: 20 m/s}\n").drag.terminal_speed.value == 20.0
 
 
 def test_what_cannot_be_measured_is_said_and_refused(call, tmp_path):

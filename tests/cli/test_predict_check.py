@@ -104,14 +104,6 @@ def test_a_board_that_lacks_something_is_refused_before_anything_is_hung(
         assert f"note: board {word} is not suitable: {path}:" in said
 
 
-@cases
-def test_what_makes_no_sense_is_said_at_its_place(old, new, said, call, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    text = (PROTOCOLS / "falling-ball.yaml").read_text("utf-8").replace(old, new, 1)
-    (tmp_path / "p.yaml").write_text(f"{text}track: {{incline: 5 deg}}\n", "utf-8")
-    assert said in call("check", "p.yaml", code=2).err
-
-
 def test_check_counts_runs_and_trial_drops(call, finished):
     done = call("check", finished.protocol)
     assert "  4 runs: 2 at each incline (40, 60 deg)" in done.out.splitlines()

@@ -91,7 +91,7 @@ def test_a_gate_that_forbids_firing_now_and_then_is_tried_again(reason, times, m
 
 
 def test_an_input_without_a_gate_is_a_note(monkeypatch):
-    monkeypatch.setattr("sim.board.Microcontroller", claims("gates", lambda gates: gates | 1 << 6))
+    monkeypatch.setattr("sim.board.Microcontroller", claims(gates=("or_", 1 << 6)))
     board = LoopedBoard(wired(None, blocked=1 << 6))
     found = findings(board)
     assert found["gates"].verdict is Verdict.NOT_POSSIBLE

@@ -156,11 +156,6 @@ def test_what_is_no_such_drive_is_left_alone(flash, tmp_path):
 
 
 @cases
-def test_options_of_the_other_boards(call, arguments, message):
-    assert message in call(*arguments, code=2).err
-
-
-@cases
 def test_a_file_that_must_not_be_flashed(tmp_path, at, size, instead, message):
     data, file = DRIVE.image_path.read_bytes(), tmp_path / "it.uf2"
     at = data.index(at.encode()) if isinstance(at, str) else at

@@ -24,7 +24,6 @@ from rig.protocol.site import gravity_at
 from rig.protocol.yamltree import load, place_of
 from tests.analysis.drops import FENCE, UNIFORM, case
 from tests.protocol.test_protocol_reader import GOOD
-from tests.refusals import refused
 from tests.tables import cases, protocol_text
 
 TWO = protocol_text("two-chains")
@@ -92,13 +91,6 @@ def test_every_prior_has_a_key_and_what_is_left_out_is_as_by_default():
     found = scene("{hang: 1 mm, jitter: 5 us, drag: 0.2, impulses: 8 %, side: 0 mm}").priors
     assert found == Priors(hang=1e-3, jitter=5e-6, drag=0.2, impulses=0.08, side=0.0)
     assert UNIFORM.priors == Priors()
-
-
-@cases
-def test_what_is_no_prior_is_refused_at_its_place(text, said):
-    (problem,) = refused(InputError, "", scene, text).problems
-    assert problem.line == len(UNIFORM.text.splitlines()) + 2
-    assert said in str(problem)
 
 
 def test_rig_check_lists_them_all_and_marks_those_of_the_protocol():

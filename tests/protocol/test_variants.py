@@ -8,7 +8,6 @@ from rig.protocol.reader import parse
 from rig.units import Quantity
 from tests.protocol.test_protocol_reader import GOOD
 from tests.refusals import refused
-from tests.tables import cases
 
 HEIGHTS = "{drop: [180 mm ± 1 mm, 228.5 mm ± 2 mm]}"
 
@@ -34,12 +33,6 @@ def test_keys_are_varied_together_and_need_not_be_stated_elsewhere():
     scenes = vary("{drop: [100 mm, 200 mm], surface.friction: [0.1, 0.2, 0.3]}").settings
     values = [(scene.drop.value, scene.surface.friction.value) for scene in scenes.values()]
     assert values == [(drop, friction) for drop in (0.1, 0.2) for friction in (0.1, 0.2, 0.3)]
-
-
-@cases
-def test_what_runs_cannot_vary_is_refused_at_its_place(words, start):
-    (problem, *_) = refused(InputError, "", vary, words).problems
-    assert str(problem).startswith(start)
 
 
 def test_what_only_another_setting_has_wrong_is_told_with_it():

@@ -80,7 +80,7 @@ def test_a_right_rig_fails_nothing_and_is_told_what_it_lacks(
     board, wiring, options, says, monkeypatch
 ):
     lab = wired(**wiring)
-    controller = claims("gates", lambda gates: gates | lab.hanging)
+    controller = claims(gates=("or_", lab.hanging))
     monkeypatch.setattr("sim.board.Microcontroller", controller)
     board = BOARDS[board](lab)
     found = outcomes(port_of(board), **options)
@@ -100,7 +100,7 @@ def test_a_busy_computer_blames_no_board(monkeypatch):
 def test_a_gate_in_use_that_is_blocked_or_not_there_fails(
     number, blocked, in_use, code, what, monkeypatch
 ):
-    monkeypatch.setattr("sim.board.Microcontroller", claims("gates", lambda gates: gates | blocked))
+    monkeypatch.setattr("sim.board.Microcontroller", claims(gates=("or_", blocked)))
     board = fewer_gates(wired(blocked=blocked), number)
     gates = outcomes(port_of(board), gates=in_use)["gates"]
     assert (gates.verdict, gates.reason.code, gates.what) == (Verdict.FAILED, code, what)
@@ -124,18 +124,13 @@ def test_a_protocol_says_which_gates_are_in_use(rig, port):
     assert any(line.startswith("gates: ok: ") and "gates clear" in line for line in lines)
 
 
-@pytest.mark.parametrize("gates", ["", "0,", "0,16", "a"])
-def test_gates_are_a_list_of_numbers(rig, gates):
-    rig("--port", FENCE, "--gates", gates, code=2)
-
-
 def test_behind_a_terminal_in_real_time(rig):
     with PtyBoard() as there:
         rig("--port", there.path)
 
 
 def test_a_drop_of_a_session_is_left_alone(monkeypatch):
-    monkeypatch.setattr("sim.board.Microcontroller", claims("gates", lambda gates: gates | 1))
+    monkeypatch.setattr("sim.board.Microcontroller", claims(gates=("or_", 1)))
     port = port_of(LoopedBoard(wired()))
     _, label, drop = hold_drop(port, 7)
     results = outcomes(port)
