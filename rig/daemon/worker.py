@@ -184,8 +184,8 @@ class Worker:
         self._beat()
         if self._stops:
             return True
-        asked = self._at_work and not self.controller.due
-        return (self._ending or not self._held) and (asked or self.controller.armed is not None)
+        is_lost = self._ending or not self._held
+        return is_lost and (self._at_work or self.controller.armed is not None)
 
     def _beat(self, patience_s: float = 0.0) -> None:
         """Note that the thread goes on, and when it will at the latest have gone on again."""

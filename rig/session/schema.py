@@ -240,7 +240,7 @@ def _same(columns: str) -> str:
 def _read_tables() -> dict[str, SessionTable]:
     tables = {}
     for head, *rows in read_paragraphs(__file__, "tables.txt"):
-        words, meaning = head.split(": ", 1)
+        words, _, meaning = head.partition(": ")
         name, *since = words.split()
         tables[name] = SessionTable(name, int(*since or "1"), meaning, rows)
     return tables

@@ -8,6 +8,7 @@ import pytest
 from rig.ready import find_protocol, ready_protocols
 from rig.usb.listing import SerialPort
 from tests.cli.lab import PROTOCOLS, command
+from tests.tables import cases
 from tests.waiting import until
 
 
@@ -74,16 +75,19 @@ def test_rig_alone_opens_the_terminal_where_there_is_one(monkeypatch, call, seen
     assert len(shown) == seen
 
 
-def test_two_rigs_have_two_daemons(folder, call, monkeypatch):
-    """Each daemon has a socket of its own, and a run goes through the one that is named."""
+@cases
+def test_a_run_goes_through_the_daemon_that_is_named_or_has_its_port(
+    folder, call, monkeypatch, runs
+):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(folder))
     with ExitStack() as stack:
-        for name in ("left", "right"):
-            line = command("daemon", "--port", "sim://", "--name", name)
+        for file, name in (("rig.sock", []), ("rig-left.sock", ["--name", "left"])):
+            line = command("daemon", "--port", "sim://", *name)
             process = stack.enter_context(subprocess.Popen(line, stderr=subprocess.DEVNULL))
             stack.callback(process.terminate)
-            until((folder / "chainrig" / f"rig-{name}.sock").exists)
-        assert not (folder / "chainrig" / "rig.sock").exists()
-        line = "run falling-ball --port sim:// --session {}.session --yes --name {}"
-        call(*line.format("left", "left").split())
-        call(*line.format("none", "middle").split(), code=4)
+            until((folder / "chainrig" / file).exists)
+        for number, (words, code, said) in enumerate(runs):
+            session = f"falling-ball --session {number}.session --yes"
+            found = call("run", *session.split(), *words.split(), code=code).err
+            assert said in found
+            assert ("through the" in found) == ("through the" in said)

@@ -362,4 +362,5 @@ class Box:
                 self.fire(token)
             self.check()
         assert self.coming() is None, self.state()
+        assert self.worker.published.get("error") is None
         self.check()

@@ -140,13 +140,6 @@ def test_a_board_that_answers_late_does_not_cost_control(processes, driver):
     assert driver.arm(1, 1)
 
 
-def test_a_daemon_that_is_asked_to_end_disarms(processes, armed):
-    processes.daemon.send_signal(signal.SIGTERM)
-    assert "rig daemon: ended" in ended(processes)
-    processes.await_phase(Phase.IDLE)
-    assert states(processes)[-1] == (1, 1, "interrupted")
-
-
 def test_a_daemon_that_is_asked_to_end_in_the_fall_records_it(processes, armed):
     one, token = armed
     one.fire(token)

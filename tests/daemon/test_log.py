@@ -54,3 +54,4 @@ def test_a_fault_of_the_program_is_logged_with_its_traceback_once(caplog):
         worker.end()
         worker.join()
     assert [record.exc_info[0] for record in caplog.records] == [ZeroDivisionError]
+    assert worker.published.get("error") is None, "no scene, so there is nothing to come back to"

@@ -240,6 +240,22 @@ def test_a_signal_waits_only_while_something_falls():
         refused(KeyboardInterrupt, "", client.call, method)
 
 
+ARMED = ("arm", 1, 1)
+DEEDS = {(): 1, (ARMED,): 0, (ARMED, ("fire", 1)): 1, (ARMED, ("stop", "enough")): 1}
+
+
+@pytest.mark.parametrize(("deeds", "signs"), DEEDS.items())
+def test_a_client_gives_signs_of_life_by_itself_unless_it_is_armed(deeds, signs):
+    answer = Future()
+    answer.set_result({"token": 1})
+    client = Client(Mock(ask=Mock(return_value=answer)))
+    client._closed = Mock(wait=Mock(side_effect=[False, True]))  # after one beat
+    for method, *values in deeds:
+        getattr(client, method)(*values)
+    client._renew()
+    assert [asked.args[0] for asked in client.line.ask.mock_calls].count("renew") == signs
+
+
 def test_a_session_that_is_closed_is_shown_to_nobody_any_more(tmp_path):
     protocol = tmp_path / "fence.yaml"
     protocol.write_text(FENCE.replace("RUNS", "1"), "utf-8")

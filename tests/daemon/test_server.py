@@ -15,7 +15,7 @@ from bench.process_fixture import ProcessFixture
 from rig.daemon import connection, rpc, service
 from rig.daemon.client import AsyncClient, Client, Line
 from rig.daemon.listener import Door
-from rig.daemon.socket_path import default_socket, prepare_folder
+from rig.daemon.socket_path import default_socket, peer_uid, prepare_folder
 from rig.errors import BusyError, DeviceError, InputError, RigError, VersionError
 from tests.refusals import refused
 from tests.tables import cases, read_table
@@ -69,6 +69,14 @@ def test_somebody_elses_folder_is_refused(tmp_path, monkeypatch):
     tmp_path.chmod(0o700)
     monkeypatch.setattr(os, "getuid", lambda: tmp_path.stat().st_uid + 1)
     refused(InputError, "belongs to another user", prepare_folder, tmp_path)
+
+
+def test_who_is_at_the_other_end_is_asked_where_a_kernel_can_tell(monkeypatch):
+    near, far = socket.socketpair()
+    with near, far, socket.socket(socket.AF_INET) as stranger:
+        assert [peer_uid(near), peer_uid(stranger)] == [os.getuid(), None]
+        monkeypatch.delattr(socket, "SO_PEERCRED")
+        assert peer_uid(near) is None
 
 
 async def test_another_user_is_not_served(door, monkeypatch):

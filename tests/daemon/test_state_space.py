@@ -139,6 +139,33 @@ def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(box):
     box.ends_well()
 
 
+def test_whoever_leaves_once_it_is_let_go_has_it_recorded_whole(box):
+    token = box.arm()
+    box.wanted = box.tokens[token]
+    box.worker.submit(lambda c: c.fire(token), "A")
+    box.worker._do(box.worker._jobs.get_nowait())
+    box.lease.release("A")
+    box.turned()
+    drop = box.worker.controller.session.drop(1, 1)
+    assert (len(drop.edges), drop.faults) == (8, ()), "two rods at two gates"
+
+
+def test_what_gates_see_is_shown_though_nobody_is_in_control(box):
+    box.lease.release("A")
+    box.worker.published.watched = True
+    box.board.touch(1)
+    box.passed(1.0, client="")
+    assert box.worker.published.get("gates") == {"blocked": 1}
+
+
+def test_a_test_of_the_release_tells_what_was_seen_of_it(box):
+    box.board.lab.drop = lambda _label: [(0.2, 1, True), (0.3, 1, False)]
+    box.board.sense(0.012)
+    seen = box.asked(lambda c: c.test_release())
+    assert (seen["edges"], seen["gates"], seen["faults"]) == (2, [1], [])
+    assert seen["release_sense_s"] == pytest.approx(0.012, rel=0.01)
+
+
 def test_what_a_test_of_the_release_left_on_the_board_is_in_nobodys_way(box):
     box.board.lab.drop = lambda _label: []
     device, label = box.worker.controller.recorder.device, pack_label(TEST_RUN, 1)

@@ -5,6 +5,8 @@ from itertools import pairwise
 import pytest
 
 from rig.link import messages as wire
+from rig.link.client import Device
+from rig.link.transcript import Transcript
 from rig.reasons import make_reason
 from tests.link.bench import LABEL
 from tests.link.suite import Suite
@@ -61,14 +63,18 @@ class MemorySuite(Suite):
         assert line.ask(wire.Acknowledge(LABEL, certificate.crc32), 6) == wire.Done()
 
     def test_events_that_nobody_has_any_more_are_a_fault(self, bench, identity, more):
-        port = LossyPort(bench)
-        device = self.reconnected(bench, port)
+        port, chunks, offline = LossyPort(bench), [], Transcript()
+        device = Device(port, bench.clock(), lambda *chunk: chunks.append(chunk))
+        device.connect(boot_wait_s=0)
         device.fire(arm(device, record_ms=record_ms(more)))
         port.lose_rx_until_ns = bench.clock().now_ns() + (record_ms(more) + 20) * 1_000_000
         drop = device.collect(LABEL)
         overwritten = make_reason("events_overwritten", missing=60, events=more, first=0)
         assert drop.faults == (overwritten,)
         assert len(drop.edges) == identity.capacity - 1  # behind the gap one change is in doubt
+        for chunk in chunks:
+            offline.feed(*chunk)
+        assert offline.unfinished_drops() == [drop], "the replay knows it, too"
         release_drop(device, drop)
 
     def test_a_short_pulse_is_an_event_and_no_edge(self, bench):

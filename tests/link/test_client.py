@@ -212,9 +212,9 @@ def certificate(label: int, events: int, crc32: int = 0) -> wire.DropCertificate
 class Liar(FakePort):
     """Says how many events it holds, and gives others."""
 
-    def __init__(self, clock, held, *events):
+    def __init__(self, clock, held, events):
         super().__init__(clock, {wire.Identify: [IDENTITY]})
-        self.held, self.events = held, events_frame(0, *events)
+        self.held, self.events = held, events
 
     def write(self, data):
         (frame,) = Decoder().feed(data)
@@ -224,51 +224,24 @@ class Liar(FakePort):
 
 
 def test_events_that_do_not_match_the_certificate_are_a_fault(clock):
-    port = Liar(clock, 1, (150, 1))
+    port = Liar(clock, 1, events_frame(0, (150, 1)))
     drop = Device(port, clock).fetch(1)
     assert len(port.written) == 3  # certificate, events, events once more
     assert make_reason("crc_mismatch") in drop.faults
 
 
 def test_a_device_that_never_gives_the_events_is_faulty(clock):
-    refused(DeviceError, "did not send the events", Device(Liar(clock, 5), clock).fetch, 1)
-
-
-class Forgetful(FakePort):
-    """Holds `total` events and keeps those from `kept` on; says so when asked for an older one."""
-
-    total, kept = 5, 3
-
-    def write(self, data):
-        for frame in Decoder().feed(data):
-            if isinstance(read := wire.unpack(frame.type, frame.payload), wire.Read):
-                event = events_frame(read.first, (100 + read.first, 1))
-                kept = event if read.first >= self.kept else self.refusal()
-                self.answers[wire.Read] = [kept if read.count else certificate(1, self.total)]
-        return super().write(data)
-
-    def refusal(self):
-        return wire.Refused(wire.RefusalReason.NOT_KEPT, self.kept)
-
-
-def test_events_no_longer_kept_are_a_fault_and_the_rest_is_read(clock):
-    port, chunks, offline = Forgetful(clock, {wire.Identify: [IDENTITY]}), [], Transcript()
-    board = Device(port, clock, lambda *chunk: chunks.append(chunk))
-    board.connect(boot_wait_s=0)
-    drop = board.fetch(1)
-    assert drop.faults == (make_reason("events_overwritten", missing=3, events=5, first=0),)
-    assert len(port.written) == 2 + 4  # delimiter and IDENTIFY; certificate, 0, 3, 4
-    for chunk in chunks:
-        offline.feed(*chunk)
-    assert offline.unfinished_drops() == [drop], "the replay knows it, too"
+    refused(
+        DeviceError,
+        "did not send the events",
+        Device(Liar(clock, 5, events_frame(0)), clock).fetch,
+        1,
+    )
 
 
 def test_a_device_that_refuses_even_what_it_says_it_keeps_is_not_asked_for_ever(clock):
-    class Denier(Forgetful):
-        def refusal(self):
-            return wire.Refused(wire.RefusalReason.NOT_KEPT, 0)
-
-    error = refused(DeviceRefusedError, "", Device(Denier(clock, {}), clock).fetch, 1)
+    port = Liar(clock, 5, wire.Refused(wire.RefusalReason.NOT_KEPT, 0))
+    error = refused(DeviceRefusedError, "", Device(port, clock).fetch, 1)
     assert error.reason is wire.RefusalReason.NOT_KEPT
 
 

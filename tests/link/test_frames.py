@@ -18,6 +18,7 @@ from rig.link.frames import (
     encode,
 )
 from rig.link.refusals import DeviceRefusedError
+from sim.line import BadLine
 from tests.examples import examples
 from tests.link.strategies import MESSAGES
 from tests.refusals import refused
@@ -122,6 +123,16 @@ def test_a_cut_payload_is_never_another_size(message, data):
     for wrong in (payload[: data.draw(st.integers(0, len(payload)))], payload + b"\1"):
         if wrong != payload and not isinstance(message, wire.EventsFrame):
             refused(wire.MessageError, "", wire.unpack, code, wrong)
+
+
+def test_a_bad_line_alters_bytes_or_loses_them():
+    altered, left = (
+        BadLine(*faults, busy=0.0, seed=3).transfer(bytes(1000), b"")[0]
+        for faults in ((0.2, 0.0), (0.0, 0.2))
+    )
+    assert (len(altered), left) == (1000, bytes(len(left)))
+    assert 100 < 1000 - altered.count(0) < 300
+    assert 700 < len(left) < 900
 
 
 def test_every_message_is_in_the_table_once():
