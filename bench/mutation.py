@@ -116,16 +116,18 @@ class Reached:
         """List the tests that may notice a fault, as ranked above, until they take too long.
 
         Where none is known to run through the line (it runs when the file is loaded, or in a
-        process that was killed), all that run through the file are, else all there are. Of the
-        core in C no lines are recorded, and its memory outlives a test: all its tests, in order.
+        process that was killed), all that run through the file are, and all of its room, else all
+        there are. Of the core in C no lines are recorded, and its memory outlives a test: all its
+        tests, in order.
         """
         if not path.endswith(".py"):
             return [one for one in self.seconds if one.startswith(CORE_TESTS)]
         by_line, names = self.lines.get(path, {}), [*self.seconds]
-        whole = set().union(*by_line.values()) or range(len(names))
+        room = next(room for room, folders in ROOMS.items() if path.startswith(folders))
+        own = f"tests/{room}/", f"tests/{path.split('/')[1]}/"
+        whole = {n for n, name in enumerate(names) if name.startswith(own)}.union(*by_line.values())
         span = map(str, _within_a_function(path, line))
-        found = set().union(*(by_line.get(at, ()) for at in span)) or whole
-        own = f"tests/{path.split('/')[1]}/"
+        found = set().union(*(by_line.get(at, ()) for at in span)) or whole or range(len(names))
         ranked = sorted((names[n] for n in sorted(found)), key=self.seconds.__getitem__)
         ranked.sort(key=lambda one: not one.startswith(own))
         spent = accumulate(self.seconds[one] * (not one.startswith(own)) for one in ranked)

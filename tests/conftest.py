@@ -4,6 +4,7 @@ import asyncio
 import gc
 import inspect
 import os
+import shutil
 import signal
 import sys
 from collections.abc import Callable, Container, Iterator
@@ -14,6 +15,7 @@ import pytest
 from hypothesis import settings
 from hypothesis.internal.conjecture import providers
 
+from bench.mutation_plugin import RECORD, SELECT
 from tests.once import loops_compiled  # noqa: F401 - a fixture
 from tests.programs import Done, end
 
@@ -25,7 +27,9 @@ settings.register_profile("search", max_examples=2000, deadline=None)
 settings.load_profile("same")
 # A user's shell tells Python nothing: PYTHONUNBUFFERED, say, would hide what an exit loses. Modules
 # of the thousand programs that tests start are compiled once, whatever this shell prefers.
-for setting in [name for name in os.environ if name.startswith("PYTHON")]:
+# Only the bench of faults has its own children in this way (bench/children).
+KEPT = {"PYTHONPATH"} if {RECORD, SELECT} & os.environ.keys() else set()
+for setting in {name for name in os.environ if name.startswith("PYTHON")} - KEPT:
     del os.environ[setting]
 sys.dont_write_bytecode = False
 
@@ -150,7 +154,13 @@ def _no_users_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def _own_cache(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have no test see what another has kept; `analysed_once` has those of a module share it."""
+    """Have no test see what another has kept; `analysed_once` has those of a module share it.
+
+    What was kept of `finished` as it was recorded is there for all who look at it.
+    """
     if "analysed_once" not in request.fixturenames:
         folder = Path(os.environ["XDG_CACHE_HOME"]) / f"{hash(request.node.nodeid):x}"
         monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
+    if "finished" in request.fixturenames:
+        kept = request.getfixturevalue("finished").session.with_name("caches")
+        shutil.copytree(kept, os.environ["XDG_CACHE_HOME"], dirs_exist_ok=True)

@@ -126,8 +126,8 @@ class ApiMethod(NamedTuple):
 
     do: Callable[..., Any]
     parameters: type[msgspec.Struct]
-    of_rig: bool = False
-    writes: bool = False
+    of_rig: bool
+    writes: bool
 
     def bind(self, params: Any) -> Callable[..., Any]:
         """Return what is to be done, with the parameters that a client sent.

@@ -4,11 +4,9 @@ import json
 import os
 import shutil
 import signal
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -29,17 +27,19 @@ class Finished:
     protocol: Path
     table: Done
 
-    def copy(self, folder: Path) -> Path:
+    def copy(self, folder):
         """Copy the session to a place where it may be changed."""
         return shutil.copy(self.session, folder / "copy.session")
 
 
 @pytest.fixture(scope="session")
-def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
-    def fill(folder: Path) -> None:
+def finished(tmp_path_factory):
+    def fill(folder):
         protocol, session = folder / "short.yaml", folder / "short.session"
         protocol.write_text(short(), "utf-8")
-        told = rig("run", protocol, "--port", "sim://", "--session", session, "--seed", 1)
+        kept = os.environ | {"XDG_CACHE_HOME": str(folder / "caches")}
+        words = ("run", protocol, "--port", "sim://", "--session", session, "--seed", 1)
+        told = rig(*words, env=kept)
         (folder / "told.json").write_text(json.dumps(told), "utf-8")
 
     folder = filled_once(tmp_path_factory, "finished", fill)
@@ -48,20 +48,20 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
 
 
 @pytest.fixture(scope="session")
-def fences(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def fences(tmp_path_factory):
     """Record five drops of a fence, which are quickly analysed; its protocol lies beside it."""
 
-    def fill(folder: Path) -> None:
+    def fill(folder):
         record(folder, short_fence(5, "5 s"), "sim://?seed=2", "fences")
 
     return filled_once(tmp_path_factory, "fences", fill) / "fences.session"
 
 
 @pytest.fixture(scope="session")
-def analysis(finished: Finished, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+def analysis(finished, tmp_path_factory):
     """What ``rig analyze --json`` prints of the finished session."""
 
-    def fill(folder: Path) -> None:
+    def fill(folder):
         said = rig("analyze", finished.session, "--json").out
         (folder / "said.json").write_text(said, "utf-8")
 
@@ -70,7 +70,7 @@ def analysis(finished: Finished, tmp_path_factory: pytest.TempPathFactory) -> di
 
 
 @pytest.fixture
-def protocol(tmp_path: Path) -> Path:
+def protocol(tmp_path):
     """Write a protocol of two runs: at 40° and at 60°."""
     path = tmp_path / "short.yaml"
     path.write_text(short(repeats=1), "utf-8")
@@ -78,7 +78,7 @@ def protocol(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def fence(tmp_path: Path) -> Path:
+def fence(tmp_path):
     """Write a protocol of two drops that are quickly analysed."""
     path = tmp_path / "fence.yaml"
     path.write_text(short_fence(), "utf-8")
@@ -86,14 +86,14 @@ def fence(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def run(call: Callable[..., Done], tmp_path: Path, fence: Path) -> Callable[..., Done]:
+def run(call, tmp_path, fence):
     """Record two drops of a fence: what falls is all the same to a recording."""
     words = ("run", fence, "--port", "sim://?seed=1", "--session", tmp_path / "s", "--yes")
     return partial(call, *words)
 
 
 @pytest.fixture
-def unread() -> Iterator[int]:
+def unread():
     """Open a stream at whose other end nobody listens."""
     ours, theirs = os.pipe()
     os.close(ours)
@@ -102,7 +102,7 @@ def unread() -> Iterator[int]:
 
 
 @pytest.fixture(autouse=True)
-def _signals() -> Iterator[None]:
+def _signals():
     """Have Ctrl-C not ignored, as it is behind a shell's ``&``, and see handlers put back."""
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
     if before[0] is signal.SIG_IGN:

@@ -5,7 +5,6 @@ import io
 import json
 import re
 import zipfile
-from pathlib import Path
 
 import pytest
 
@@ -17,7 +16,7 @@ from rig.protocol.reader import read
 from tests.cli.lab import short
 
 
-def unpacked(path: Path) -> bytes:
+def unpacked(path):
     """All bytes of a file, and of what a page carries inside itself."""
     data = path.read_bytes()
     for packed in re.findall(rb"base64,([\w+/=]+)", data):
@@ -31,7 +30,7 @@ def unpacked(path: Path) -> bytes:
     return data.replace("−".encode(), b"-")
 
 
-def digits(found: dict) -> set[bytes]:
+def digits(found):
     """Write every measurand of an analysis with six digits, in each of its units."""
     numbers = {
         (row, record[row.name]["value"])

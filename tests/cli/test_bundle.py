@@ -253,13 +253,6 @@ def test_every_scene_has_a_bundle(name, call, tmp_path, request):
             assert b"chain" not in files[file].replace(b"chainrig", b"")
 
 
-def test_of_an_imported_session_nobody_knows_when_limits_were_fixed(fences, call, tmp_path):
-    call("export", fences, "--csv", tmp_path)
-    session, protocol = tmp_path / "imported", PROTOCOLS / "picket-fence.yaml"
-    call("import", tmp_path / "edges.csv", "--protocol", protocol, "--session", session)
-    assert "first run: unknown, the edges were" in call("verify", session).out
-
-
 @pytest.mark.usefixtures("derived_once")
 def test_a_signature_is_checked(bundle, fences, call, tmp_path):
     minisign = pytest.importorskip("minisign")
@@ -284,21 +277,14 @@ def test_a_signature_is_checked(bundle, fences, call, tmp_path):
     call("verify", path, code=3)
 
 
-def test_notes_and_files_are_appended_and_travel(fences, call, tmp_path):
-    session, photo, page = tmp_path / "my.session", tmp_path / "rig µ.jpg", tmp_path / "p.html"
+def test_notes_and_files_change_no_verdict_and_travel(fences, call, tmp_path):
+    session, photo = tmp_path / "my.session", tmp_path / "rig µ.jpg"
     shutil.copy(fences, session)
     photo.write_bytes(b"\xff\xd8 a photograph")
     before = [run["verdict"] for run in json.loads(call("analyze", session, "--json").out)["runs"]]
-    for text in ("the magnet let go late", "<b>& later</b>"):
-        call("notes", session, "--run", 3, text)
+    call("notes", session, "--run", 3, "the magnet let go late")
     call("attach", session, photo)
     after = [run["verdict"] for run in json.loads(call("analyze", session, "--json").out)["runs"]]
     assert after == before
-    call("report", session, "-o", page)
-    for words in ("the magnet let go late · &lt;b&gt;", "rig µ.jpg"):
-        assert words in page.read_text("utf-8")
     call("export", session, "--bundle", tmp_path / "b.eln")
     assert read_bundle(tmp_path / "b.eln")[0]["attached/1-rig_µ.jpg"] == photo.read_bytes()
-    call("verify", session)
-    call("recover", session, "-o", tmp_path / "saved.session")
-    assert "rig µ.jpg" in call("verify", tmp_path / "saved.session").out

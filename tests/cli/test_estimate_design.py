@@ -26,21 +26,6 @@ def test_an_estimate_says_everything_in_json(call, finished):
     assert json.loads(call("estimate", finished.session, "--json").out) == found
 
 
-def test_an_estimate_as_text_is_stamped(call, finished):
-    done = call("estimate", finished.session)
-    assert done.err == ""
-    assert done.out.startswith("SIMULATED DATA\n4 good drops")
-    for said in ("Best single α", "end correction", "Eq. 9", "The protocol's model"):
-        assert said in done.out
-
-
-def test_pictures_of_an_estimate_are_stamped(call, finished, tmp_path):
-    call("estimate", finished.session, "-o", tmp_path / "pictures")
-    texts = {path.name: path.read_text("utf-8") for path in (tmp_path / "pictures").iterdir()}
-    assert {"alpha.svg", "curves.svg", "impulses.svg"} <= texts.keys()
-    assert all("SIMULATED" in text for text in texts.values())
-
-
 def test_a_design_of_what_is_there(call):
     words = ("design", PROTOCOLS / "single-chain.yaml", "--no-search", "--json")
     found = json.loads(call(*words).out)

@@ -19,7 +19,7 @@ rig.__main__.start()
 AT_WORK = "lambda _: type('module', (), {'main': broken})"
 
 
-def ended(program: str, state: object, **options):
+def ended(program, state, **options):
     return subprocess.run(
         [sys.executable, "-c", program],
         env=os.environ | {"XDG_STATE_HOME": str(state)},

@@ -50,7 +50,7 @@ def test_every_row_is_computed_and_speaks_of_itself(name):
 def test_a_new_measurand_appears_wherever_results_do(call, finished, tmp_path, monkeypatch):
     unseen(monkeypatch)
     session = finished.copy(tmp_path)
-    found = json.loads(call("analyze", session, "--json").out)
+    found = json.loads(call("analyze", session, "--json", "--fresh").out)
     for run in found["runs"]:
         assert {"value", "u", "U95"} == set(run[BLOW.name])
         speed = 9.81 * run["fall_time_s"]["value"]

@@ -52,7 +52,7 @@ def test_a_given_alpha_needs_no_surface_numbers(predicted):
 
 @pytest.fixture
 def untried(monkeypatch):
-    """Let no trial drops fall, which take long: `test_check_counts_runs_and_trial_drops` does."""
+    """Let no trial drops fall, which take long: a story does."""
     monkeypatch.setattr("rig.design.trials.trials", lambda _: Trials(20, 20))
 
 
@@ -78,16 +78,6 @@ def test_check_says_what_is_there_and_what_was_left_out(call, protocol):
     assert able == ([boards] if "\ngates:" in text else [])
 
 
-@pytest.mark.usefixtures("untried")
-def test_check_for_one_board_is_its_refusal(call):
-    graded = "protocols/graded-chain.yaml"
-    call("check", graded, "--board", "mega")
-    done = call("check", graded, "--board", "uno", code=2)
-    assert done.out == ""
-    said = "gates.free[4].channel: found 12; the board (Arduino Uno) has gates 0 to 11: change this"
-    assert f"{said}, or use a Raspberry Pi Pico or an Arduino Mega 2560" in done.err
-
-
 @cases
 def test_a_board_that_lacks_something_is_refused_before_anything_is_hung(
     call, tmp_path, old, new, problem
@@ -102,19 +92,3 @@ def test_a_board_that_lacks_something_is_refused_before_anything_is_hung(
     said = describe(read(path))
     for word in ("mega", "uno"):
         assert f"note: board {word} is not suitable: {path}:" in said
-
-
-def test_check_counts_runs_and_trial_drops(call, finished):
-    done = call("check", finished.protocol)
-    assert "  4 runs: 2 at each incline (40, 60 deg)" in done.out.splitlines()
-    assert "20 simulated trial drops were identified" in done.out
-
-
-def test_a_table_has_no_columns_of_what_is_not_there(call):
-    fence = call("predict", PROTOCOLS / "picket-fence.yaml").out.splitlines()
-    assert fence[0].split() == ["speed", "(m/s)", "t", "(s)", "model"]
-    assert len(fence) == 3
-    single = call("predict", PROTOCOLS / "single-chain.yaml").out
-    assert "V ± U (m/s)" in single
-    assert "Δz" not in single
-    assert "(cm)" not in single

@@ -24,13 +24,6 @@ def test_every_ready_protocol_is_listed_with_its_title(call):
     assert "A ball past four gates" in next(row for row in rows if row.startswith("falling-ball"))
 
 
-def test_a_ready_protocol_is_copied_once(folder, call):
-    call("ready", "glider")
-    copy = folder / "glider.yaml"
-    assert copy.read_bytes() == (PROTOCOLS / "glider.yaml").read_bytes()
-    assert "glider.yaml already exists" in call("ready", "glider", code=2).err
-
-
 def test_a_file_in_the_folder_wins(folder):
     ready = str(ready_protocols()["glider"])
     assert find_protocol("glider") == ready

@@ -180,6 +180,8 @@ def test_a_signal_comes_where_it_is_let_through_or_at_the_end():
     interrupts, reached = Interrupts(), []
 
     def work():
+        with interrupts.let_through():
+            reached.append("before")
         signal.raise_signal(signal.SIGTERM)
         reached.append("inside")
         with interrupts.let_through():
@@ -187,7 +189,7 @@ def test_a_signal_comes_where_it_is_let_through_or_at_the_end():
 
     with interrupts.caught(), pytest.raises(KeyboardInterrupt):
         work()
-    assert reached == ["inside"]
+    assert reached == ["before", "inside"]
     interrupts.check()
     with pytest.raises(KeyboardInterrupt), interrupts.caught():
         signal.raise_signal(signal.SIGTERM)

@@ -91,16 +91,6 @@ def test_three_voids_of_a_kind_end_it_with_code_3_and_still_json(run, call, tmp_
     assert f"<td>{what}" in unescape((tmp_path / "r.html").read_text("utf-8"))
 
 
-def test_a_finished_session_is_not_made_again(call, finished, tmp_path):
-    session = finished.copy(tmp_path)
-    log = log_of(session)
-    args = ("run", finished.protocol, "--port", "sim://", "--session", session, "--json")
-    first, second = call(*args), call(*args)
-    assert "run " not in first.err
-    assert log_of(session) == log
-    assert [r["attempt"] for r in json.loads(second.out)["runs"]] == [1, 1, 1, 1]
-
-
 def test_a_line_that_loses_most_bytes_is_device_trouble_and_can_be_continued(
     run, call, tmp_path, fence
 ):
@@ -128,22 +118,12 @@ def test_a_bad_line_may_be_exchanged_for_a_better_one(run, tmp_path, fence):
     else:
         pytest.fail("no seed gets through to the board and fails then")
     run(session.name, port="sim://?lose=0", protocol=fence)
+    assert "run " not in run(session.name, protocol=fence).err, "nothing is made again"
     assert_whole(session, 2)
-    run(session.name, protocol=fence)
     assert ports_of(session) == [
         f"sim://?lose=3%25&seed={seed}",
         *[f"sim://?lose=0&seed={seed}"] * 2,
     ]
-
-
-def test_other_chains_are_not_mixed_into_a_simulated_session(run, tmp_path, fence):
-    run("s", "--seed", 3, protocol=fence)
-    before = (tmp_path / "s").read_bytes()
-    for more, port in ((("--seed", 4), "sim://"), ((), "sim://?seed=4")):
-        assert "seed" in run("s", *more, port=port, protocol=fence, code=2).err
-    assert (tmp_path / "s").read_bytes() == before
-    run("s", protocol=fence)
-    run("s", "--seed", 3, protocol=fence)
 
 
 def test_a_session_that_was_moved_can_be_continued(call, tmp_path, fence):

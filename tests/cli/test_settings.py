@@ -9,6 +9,7 @@ from rig.protocol.plan import runs
 from rig.protocol.reader import parse, read
 from tests.cli.lab import PROTOCOLS, record, short, truth_of
 
+pytestmark = pytest.mark.usefixtures("analysed_once")
 HEIGHTS = [f"drop {height} mm ± 1 mm" for height in (900, 1200, 1600)]
 CHAINS = ["drop 180 mm", "drop 228.5 mm"]
 

@@ -1,7 +1,6 @@
 """A rig of real processes for each test."""
 
 import asyncio
-from collections.abc import Callable, Iterator
 from contextlib import asynccontextmanager
 from types import SimpleNamespace
 
@@ -14,7 +13,7 @@ from tests.waiting import PATIENCE_S
 
 
 @pytest.fixture
-def processes() -> Iterator[ProcessFixture]:
+def processes():
     """Have a board and a daemon for a protocol of one run."""
     with ProcessFixture(runs=1, seed=3) as made:
         made.start_daemon()
@@ -22,11 +21,11 @@ def processes() -> Iterator[ProcessFixture]:
 
 
 @pytest.fixture
-def client(processes: ProcessFixture) -> Iterator[Callable[[str], Client]]:
+def client(processes):
     """Connect clients that are gone at the end of the test."""
     made: list[Client] = []
 
-    def connect(name: str) -> Client:
+    def connect(name):
         made.append(processes.client(name))
         return made[-1]
 

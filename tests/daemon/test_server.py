@@ -8,17 +8,19 @@ import resource
 import socket
 import stat
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 import pytest
 
 from bench.process_fixture import ProcessFixture
 from rig.daemon import connection, rpc, service
-from rig.daemon.client import AsyncClient, Client, Line
+from rig.daemon.client import AsyncClient, Line
 from rig.daemon.listener import Door
 from rig.daemon.socket_path import default_socket, peer_uid, prepare_folder
 from rig.errors import BusyError, DeviceError, InputError, RigError, VersionError
 from tests.refusals import refused
 from tests.tables import cases, read_table
+from tests.waiting import PATIENCE_S
 
 _SECTIONS = {*read_table(__file__, "sections")}
 
@@ -52,23 +54,25 @@ async def test_only_the_user_may_come_near(door):
     assert stat.S_IMODE(door.path.stat().st_mode) == 0o600
 
 
-def test_a_folder_that_is_open_to_others_is_refused(tmp_path):
+def test_a_place_where_no_daemon_is_or_can_be_is_refused_and_left_as_it_is(tmp_path, monkeypatch):
+    def seen(kind, words, *works):
+        return [refused(kind, words, work, place).hint for work, place in works]
+
+    file, place = tmp_path / "my.yaml", tmp_path / "rig.sock"
+    file.write_text("chains")
+    line, both = partial(Line, name="t"), partial(AsyncClient.connect, name="t")
     tmp_path.chmod(0o755)
-    refused(InputError, "open to other users", prepare_folder, tmp_path)
-    refused(InputError, "open to other users", Line, tmp_path / "rig.sock", "t")
-
-
-def test_a_folder_that_cannot_be_made_is_refused(tmp_path):
-    (tmp_path / "file").touch()
-    with pytest.raises(InputError, match=r"cannot use .*Not a directory") as caught:
-        prepare_folder(tmp_path / "file" / "door")
-    assert "--socket" in caught.value.hint
-
-
-def test_somebody_elses_folder_is_refused(tmp_path, monkeypatch):
+    seen(InputError, "open to other users", (prepare_folder, tmp_path), (line, place))
     tmp_path.chmod(0o700)
+    hints = seen(InputError, r"cannot use .*Not a directory", (prepare_folder, file / "door"))
+    hints += seen(InputError, r"cannot use .*in use", (Door, file))
+    hints += seen(InputError, r"cannot use .*too long", (Door, tmp_path / (110 * "x")))
+    assert all("--socket" in hint for hint in hints)
+    seen(RigError, r"no daemon at .*/rig\.sock: No such file or directory", (line, place))
+    refused(RigError, "no daemon at", asyncio.run, both(place))
     monkeypatch.setattr(os, "getuid", lambda: tmp_path.stat().st_uid + 1)
-    refused(InputError, "belongs to another user", prepare_folder, tmp_path)
+    seen(InputError, "belongs to another user", (prepare_folder, tmp_path))
+    assert file.read_text() == "chains"
 
 
 def test_who_is_at_the_other_end_is_asked_where_a_kernel_can_tell(monkeypatch):
@@ -166,21 +170,6 @@ def test_a_second_daemon_is_refused_and_a_dead_ones_socket_is_not_in_the_way():
         assert processes.socket.exists()
         processes.start_daemon()
         processes.client().close()
-
-
-def test_a_place_that_cannot_be_a_socket_is_refused_and_left_as_it_is(tmp_path):
-    tmp_path.chmod(0o700)
-    (tmp_path / "my.yaml").write_text("chains")
-    for name, why in (("my.yaml", "in use"), (110 * "x", "too long")):
-        assert "--socket" in refused(InputError, rf"cannot use .*{why}", Door, tmp_path / name).hint
-    assert (tmp_path / "my.yaml").read_text() == "chains"
-
-
-def test_no_daemon_is_said_so(tmp_path):
-    tmp_path.chmod(0o700)
-    with pytest.raises(RigError, match=r"no daemon at .*/rig\.sock: No such file or directory"):
-        Client(Line(tmp_path / "rig.sock", "t"))
-    refused(RigError, "no daemon at", asyncio.run, AsyncClient.connect(tmp_path / "rig.sock", "t"))
 
 
 def test_the_usual_place(monkeypatch, tmp_path):
@@ -311,8 +300,10 @@ async def test_a_worker_that_dies_ends_the_daemon(door, monkeypatch, caplog):
 
     monkeypatch.setattr(door.server._worker, "_attend", broken)
     door.server._worker.wake()
+    waiting = door.server._worker.submit(lambda _: None, None)
     with pytest.raises(SystemError):
         await door.server.serving
+    assert "internal error" in str(waiting.exception(PATIENCE_S))
 
 
 async def test_a_stop_is_read_behind_any_number_of_requests(door, monkeypatch):

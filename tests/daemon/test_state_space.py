@@ -10,6 +10,7 @@ import shutil
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from unittest.mock import Mock
 
 import pytest
 
@@ -139,6 +140,14 @@ def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(box):
     box.ends_well()
 
 
+def test_a_drop_is_shown_with_as_many_events_as_its_certificate_has(box):
+    box.board.lab.drop = lambda _label: [(0.1, 0, True), (0.1, 1, True), (0.2, 0, False)]
+    token = box.arm()
+    box.asked(lambda c: c.fire(token))
+    assert box.worker.published.get("drop")["events"] == 2
+    assert len(box.worker.published.snapshot()["state"]["edges"]) == 3
+
+
 def test_whoever_leaves_once_it_is_let_go_has_it_recorded_whole(box):
     token = box.arm()
     box.wanted = box.tokens[token]
@@ -148,6 +157,12 @@ def test_whoever_leaves_once_it_is_let_go_has_it_recorded_whole(box):
     box.turned()
     drop = box.worker.controller.session.drop(1, 1)
     assert (len(drop.edges), drop.faults) == (8, ()), "two rods at two gates"
+
+
+def test_a_worker_with_nothing_to_do_rests(box):
+    box.turned = Mock(wraps=box.turned)
+    box.passed(3.0)
+    assert 3 <= box.turned.call_count < 60
 
 
 def test_what_gates_see_is_shown_though_nobody_is_in_control(box):
@@ -210,6 +225,8 @@ def test_who_is_held_up_says_by_what_and_whether_anything_is_armed(box, monkeypa
     box.arm()
     armed = [stalled(2.0 * STALL_S, disk_s) for disk_s in (0.0, 1.0)]
     assert armed == ["held_up_armed", "disk_slow_armed"]
+    monkeypatch.undo()
+    assert box.asked(lambda _: box.clock.sleep(1.5 * STALL_S) or worker.stall()) is not None
 
 
 def test_what_fails_is_in_the_state_before_it_is_answered(box):

@@ -1,7 +1,6 @@
 """The Pico's image and its emulator, or the reason why there is none."""
 
 import os
-from pathlib import Path
 
 import pytest
 
@@ -13,7 +12,7 @@ from tests.programs import run_program
 FOLDER = FIRMWARE / "build" / "rp2040"
 
 
-def build() -> Path:
+def build():
     """Build the image, and see that there is an emulator for it."""
     need("arm-none-eabi-gcc", "node")
     try:
@@ -26,7 +25,7 @@ def build() -> Path:
     return FOLDER / "firmware.uf2"
 
 
-def symbol(name: str) -> int:
+def symbol(name):
     """Say where a variable of the firmware is."""
     table = run_program("arm-none-eabi-nm", FOLDER / "firmware.elf").stdout
     return next(
@@ -34,7 +33,7 @@ def symbol(name: str) -> int:
     )
 
 
-def programs() -> list[int]:
+def programs():
     """Read the words that PIO runs out of the image."""
     build()
     image = (FOLDER / "firmware.bin").read_bytes()

@@ -1,7 +1,5 @@
 """Both AVR boards' real binaries in the emulator: the suite, stamps, release, wires and name."""
 
-from pathlib import Path
-
 import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
@@ -14,18 +12,18 @@ from rig_emulator.board import EmulatedBoard
 from rig_emulator.name import NAME_AT
 from rig_emulator.protocol_emu import EmulatedSerial
 from rig_emulator.stand import Flip, Stand
-from rig_emulator.wiring import BOARDS, Wiring
+from rig_emulator.wiring import BOARDS
 from sim.dials import read_dials
 from sim.lab import ChainLab
 from tests.firmware.toolchain import FIRMWARE, make
-from tests.link.bench import LABEL, Bench, ScriptedLab
+from tests.link.bench import LABEL, Bench
 from tests.link.conformance import DeviceConformance
 from tests.link.talk import Wire, arm
 
 _TURN_TICKS = 1 << 16
 
 
-def image_for(wiring: Wiring) -> Path:
+def image_for(wiring):
     return make(f"build/{wiring.mcu}/firmware.elf")
 
 
@@ -34,7 +32,7 @@ class AvrBench(Bench):
     touch_s = 1e-3
     tick_tolerance = 5  # an edge waits for the instruction that it interrupts
 
-    def __init__(self, lab: ScriptedLab, name: str) -> None:
+    def __init__(self, lab, name):
         wiring = BOARDS[name]
         self.can_sense = wiring.sense is not None
         super().__init__(lab, EmulatedBoard(wiring, image_for(wiring), lab, seed=1, ppm=2000))
@@ -93,18 +91,18 @@ class TestUno(AvrConformance):
 SCENE = str(FIRMWARE.parent / "protocols/inclined-uniform.yaml")
 
 
-def stand_of(name: str, **changes) -> Stand:
+def stand_of(name, **changes):
     wiring = BOARDS[name]
     return Stand(wiring, image_for(wiring), **changes)
 
 
 @pytest.fixture(scope="module", params=list(BOARDS))
-def stand(request) -> Stand:
+def stand(request):
     return stand_of(request.param)
 
 
 @pytest.fixture(scope="module")
-def mega() -> Stand:
+def mega():
     return stand_of("mega")
 
 
@@ -183,7 +181,7 @@ def test_the_stack_has_room_and_the_watchdog_slept(stand):
 _US = 16
 
 
-def pulses(stand: Stand, recording) -> list[list[int]]:
+def pulses(stand, recording):
     """Say when each release changed."""
     return [[c.cycle for c in recording.outputs if c.pin == pin] for pin in stand.wiring.releases]
 

@@ -3,8 +3,6 @@
 import re
 import shutil
 import struct
-import subprocess
-from pathlib import Path
 
 import pytest
 
@@ -29,7 +27,7 @@ HOST = (FIRMWARE / "host" / "board.h").read_text()
 API = (FIRMWARE / "core" / "board_api.h").read_text()
 
 
-def compiled(folder, board: str) -> subprocess.CompletedProcess[str]:
+def compiled(folder, board):
     need("gcc")
     (folder / "board.h").write_text(board)
     (folder / "it.c").write_text('#include "board_api.h"\n')
@@ -103,7 +101,7 @@ EACH = pytest.mark.parametrize("target", TARGETS.values(), ids=TARGETS)
 COMPILERS = {"avr-gcc": "PREBUILT_WITH", "arm-none-eabi-gcc": "PICO_PREBUILT_WITH"}
 
 
-def built_in(folder: Path) -> Path:
+def built_in(folder):
     """Copy the sources there, build them, and say where the images are."""
     need("make", *COMPILERS, "avr-objcopy")
     makefile = (FIRMWARE / "Makefile").read_text()
@@ -123,7 +121,7 @@ def built_in(folder: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def images(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def images(tmp_path_factory):
     return built_in(tmp_path_factory.mktemp("prebuilt") / "another name" / "much deeper")
 
 

@@ -3,9 +3,7 @@
 import json
 import subprocess
 import sys
-from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 import pytest
 
@@ -13,9 +11,7 @@ import rig.boards
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
 from rig.errors import DeviceError, InputError
 from rig.link import messages as wire
-from rig.link.client import Device
 from rig.link.port import open_port
-from rig.records import Drop
 from rig_emulator.avr import Avr
 from rig_emulator.controller import Stop
 from rig_emulator.wiring import BOARDS, board_named, firmware_for
@@ -39,11 +35,11 @@ STRICT = "-std=gnu11 -Wall -Wextra -Wshadow -Werror -Os -DF_CPU=16000000UL"
 
 
 @pytest.fixture
-def compiled(tmp_path) -> Callable[[str, str], Path]:
+def compiled(tmp_path):
     """Compile a program of the emulator's for a controller."""
     need("avr-gcc")
 
-    def compile_for(source: str, mcu: str) -> Path:
+    def compile_for(source, mcu):
         words = *STRICT.split(), f"-mmcu={mcu}", FIRMWARE / "emulator" / source
         run_program("avr-gcc", *words, "-o", program := tmp_path / "program.elf")
         return program
@@ -51,7 +47,7 @@ def compiled(tmp_path) -> Callable[[str, str], Path]:
     return compile_for
 
 
-def stamping(program: Path, mcu: str) -> tuple[Avr, int]:
+def stamping(program, mcu):
     """Start stamps.c with all gates low; also the cycle at which its timer was 0."""
     avr = Avr(program, mcu)
     for pin in range(8):
@@ -157,7 +153,7 @@ def _built():
     make("all")
 
 
-def chains_fall(device: Device) -> Drop:
+def chains_fall(device):
     return record_drop(device, gates=0b11, pulse_us=80_000, record_ms=600)
 
 

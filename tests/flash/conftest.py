@@ -22,20 +22,20 @@ class FakeAvrdude:
 
     path: Path
 
-    def will(self, says: str, code: int) -> None:
+    def will(self, says, code):
         """Choose how it will end."""
         (self.path.parent / "says").write_text(says)
         (self.path.parent / "code").write_text(str(code))
 
     @property
-    def argv(self) -> list[str] | None:
+    def argv(self):
         """How it was called, or `None`."""
         file = self.path.parent / "argv.json"
         return json.loads(file.read_text()) if file.exists() else None
 
 
 @pytest.fixture
-def avrdude(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FakeAvrdude:
+def avrdude(tmp_path, monkeypatch):
     folder = tmp_path / "programs"
     folder.mkdir()
     path = folder / "avrdude"

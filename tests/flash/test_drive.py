@@ -1,9 +1,7 @@
 """``rig flash --board pico``: a folder for its drive, and a board that is there afterwards."""
 
-from collections.abc import Callable
 from functools import partial
 from itertools import count
-from pathlib import Path
 from threading import Timer
 from unittest.mock import Mock
 
@@ -25,7 +23,7 @@ VERSION = shipped_firmware(DRIVE.board.name)
 NAMES = {"board": DRIVE.board.name, "firmware": VERSION}
 
 
-def picos(folder: Path, monkeypatch, *names: str) -> list[Path]:
+def picos(folder, monkeypatch, *names):
     """Mount drives of boards that wait for firmware, among other file systems."""
     waiting = [folder / name for name in names]
     for drive in waiting:
@@ -42,14 +40,14 @@ def picos(folder: Path, monkeypatch, *names: str) -> list[Path]:
     return waiting
 
 
-def plug_in(monkeypatch, path: str, is_in: Callable[[], bool] = lambda: True) -> None:
+def plug_in(monkeypatch, path, is_in=lambda: True):
     """Have a Pico's port be there, while it is."""
     port = info(path, 0x2E8A, 0x000A, product="chainrig on a Pico")
     monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [port] if is_in() else [])
     monkeypatch.setattr(drives, "_LOOK_S", 0.001)
 
 
-def plugged(monkeypatch, path: str, after: int = 1) -> None:
+def plugged(monkeypatch, path, after=1):
     """Have a Pico's port appear, at the look after so many."""
     looks = count()
     plug_in(monkeypatch, path, lambda: next(looks) >= after)
@@ -71,7 +69,7 @@ def test_a_pico_is_flashed_and_asked(flash, tmp_path, monkeypatch):
     assert (drive / "chainrig.uf2").read_bytes() == DRIVE.image_path.read_bytes()
 
 
-def running(monkeypatch, mounts: Path, answer: wire.DeviceMessage) -> None:
+def running(monkeypatch, mounts, answer):
     """Have a running board answer FLASH; only when it is granted the drive is mounted."""
     mounted = mounts.read_text()
     mounts.write_text("")

@@ -2,7 +2,6 @@
 
 import ast
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,14 +19,14 @@ TALK_TEXT = (FIRMWARE / "examples/conversation.txt").read_text("utf-8")
 KINDS = {name_in_c(kind): kind for kind in wire.TABLE.values()}
 
 
-def rows(text: str) -> list[list[str]]:
+def rows(text):
     """Cells of the first table in a text, without its head."""
     table = re.search(r"(?:^\|.*\n)+", text, re.MULTILINE)
     lines = table.group().splitlines()[2:] if table else []
     return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in lines]
 
 
-def section(heading: str) -> str:
+def section(heading):
     depth = heading.index(" ")
     start = PAGE.index(f"\n{heading}\n") + len(heading) + 2
     end = re.compile(rf"^#{{1,{depth}}} ", re.MULTILINE).search(PAGE, start)
@@ -48,7 +47,7 @@ def test_every_message_has_its_table():
         assert all(row[3] for row in rows(text)[kind is wire.DropCertificate2 :]), kind
 
 
-def expected_rows(kind: type) -> list[list[str]]:
+def expected_rows(kind):
     at: int | None = 0
     found = []
     for field in wire.FIELDS[kind]:
@@ -112,7 +111,7 @@ class Said(NamedTuple):
     data: bytes
 
 
-def conversation() -> list[Said]:
+def conversation():
     """Read what each frame of the example is said to be, and its bytes."""
     found = []
     for part in re.split(r"^(?=host|device)", TALK_TEXT, flags=re.MULTILINE)[1:]:
@@ -127,7 +126,7 @@ def conversation() -> list[Said]:
     return found
 
 
-def spoken(told: str) -> wire.Message:
+def spoken(told):
     """Make the message that ``NAME(field=value, ...)`` tells of; every field must be told."""
     call = ast.parse(told, mode="eval").body
     kind = KINDS[call.func.id]
@@ -165,7 +164,7 @@ def test_what_is_said_gives_the_bytes():
 HEADER = Path(__file__).parents[2] / "firmware/core/wire.h"
 
 
-def defines(text: str) -> dict[str, int]:
+def defines(text):
     found = re.findall(r"^#define (\w+) (\S+)$", text, re.MULTILINE)
     names = [name for name, _ in found]
     assert len(set(names)) == len(names)
@@ -196,7 +195,7 @@ def test_every_name_is_there_with_its_value():
     assert limits | enums | codes | places == C
 
 
-def places_of(kind: type) -> Iterator[tuple[str, int]]:
+def places_of(kind):
     """Tell where each field begins, up to the first of varying size, and what varies."""
     name, at, fixed = name_in_c(kind), 0, True
     for field in wire.FIELDS[kind]:

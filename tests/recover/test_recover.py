@@ -13,9 +13,10 @@ from rig.recover.drops import Fate
 from rig.recover.examine import describe, examine
 from rig.recover.save import save
 from rig.replay import replay
+from rig.session.schema import SCHEMA_VERSION
 from rig.session.store import Session
 from tests.refusals import refused
-from tests.session.altering import alter, killed
+from tests.session.altering import alter, killed, outdate
 from tests.tables import cases
 
 
@@ -256,6 +257,12 @@ def test_a_protocol_that_is_lost_or_altered_must_be_given(sql, said, fences, cop
     assert again["protocol"] == truth["protocol"]
     assert again["simulated"]  # as its board says
     assert any(said in line for line in missing)
+
+
+@pytest.mark.parametrize("version", range(1, SCHEMA_VERSION))
+def test_a_drop_of_an_older_format_is_confirmed_by_its_bytes(version, copy):
+    outdate(copy, version)
+    assert {one.fate for one in examine(copy).drops} == {Fate.CONFIRMED}
 
 
 def test_what_may_be_simulated_is_stamped_so(copy, tmp_path):

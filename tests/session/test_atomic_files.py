@@ -3,14 +3,12 @@
 from pathlib import Path
 from unittest.mock import Mock
 
-import pytest
-
 from rig.errors import InputError
 from rig.files import write_atomic
 from tests.refusals import refused
 
 
-def test_replaces_and_leaves_nothing_else(tmp_path: Path) -> None:
+def test_replaces_and_leaves_nothing_else(tmp_path):
     path = tmp_path / ("n" * 255)
     write_atomic(path, "old")
     write_atomic(path, "new\r\nµ")
@@ -18,7 +16,7 @@ def test_replaces_and_leaves_nothing_else(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_link_stays_a_link(tmp_path: Path) -> None:
+def test_a_link_stays_a_link(tmp_path):
     target = tmp_path / "target"
     target.write_text("old")
     link = tmp_path / "link"
@@ -28,14 +26,12 @@ def test_a_link_stays_a_link(tmp_path: Path) -> None:
     assert target.read_text() == "new"
 
 
-def test_devices_are_written_through() -> None:
+def test_devices_are_written_through():
     write_atomic("/dev/null", "text")
     assert not Path("/dev/null").is_file()
 
 
-def test_a_failed_write_leaves_the_old_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     path = tmp_path / "report.html"
     path.write_text("old")
 
@@ -46,6 +42,6 @@ def test_a_failed_write_leaves_the_old_file(
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_places_that_cannot_be_written(tmp_path: Path) -> None:
+def test_places_that_cannot_be_written(tmp_path):
     refused(InputError, "it is a folder", write_atomic, tmp_path, "x")
     refused(InputError, "No such file", write_atomic, tmp_path / "no" / "file", "x")

@@ -6,7 +6,6 @@ import shutil
 import sqlite3
 from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -227,9 +226,7 @@ def test_a_snapshot_does_not_move_while_another_writes(path):
 
 
 @pytest.mark.parametrize("closed", ["file", "folder"])
-def test_where_either_cannot_be_written_nothing_is_put_beside_a_session(
-    path: Path, closed: str, monkeypatch: pytest.MonkeyPatch
-):
+def test_where_either_cannot_be_written_nothing_is_put_beside_a_session(path, closed, monkeypatch):
     make(path).close()
     protected = path if closed == "file" else path.parent
     monkeypatch.setattr(os, "access", lambda where, _mode: where != protected)  # root may all
@@ -356,7 +353,7 @@ NO_SESSIONS = {
 
 @pytest.mark.parametrize("readonly", [False, True])
 @pytest.mark.parametrize(("prepare", "words", "told"), NO_SESSIONS.values(), ids=NO_SESSIONS)
-def test_what_is_no_session(path, prepare, words: str, told: str | None, readonly: bool, call):
+def test_what_is_no_session(path, prepare, words, told, readonly, call):
     prepare(path)
     before = path.read_bytes() if path.is_file() else None
     error = refused(SessionError, words, Session.open, path, readonly=readonly)

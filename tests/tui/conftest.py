@@ -2,7 +2,6 @@
 
 import shutil
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -16,12 +15,12 @@ _FENCE = short_fence(3).replace("Free fall of a picket fence", "TITLE")
 
 
 @pytest.fixture(autouse=True)
-def _unseen(monkeypatch: pytest.MonkeyPatch) -> None:
+def _unseen(monkeypatch):
     unseen(monkeypatch)
 
 
 @pytest.fixture
-def folder() -> Iterator[Path]:
+def folder():
     """Make a folder with a name that a socket's address has room for."""
     made = Path(tempfile.mkdtemp(prefix="rig-"))
     yield made
@@ -29,7 +28,7 @@ def folder() -> Iterator[Path]:
 
 
 @pytest.fixture
-def lab(folder: Path) -> Iterator[Lab]:
+def lab(folder):
     """A quickly analysed scene before a daemon that runs."""
     protocol = folder / "fence.yaml"
     protocol.write_text(_FENCE.replace("TITLE", "A short fence"), "utf-8")
@@ -40,7 +39,7 @@ def lab(folder: Path) -> Iterator[Lab]:
 
 
 @pytest.fixture
-def cabled() -> Iterator[tuple[ProcessFixture, Lab]]:
+def cabled():
     """A board behind a cable, and a daemon that owns its port."""
     with ProcessFixture(runs=2, seed=3) as processes:
         bench = Lab(processes.folder, processes.protocol, str(processes.port))
@@ -50,6 +49,6 @@ def cabled() -> Iterator[tuple[ProcessFixture, Lab]]:
 
 
 @pytest.fixture
-def fence() -> str:
+def fence():
     """The scene's text; TITLE stands for its title."""
     return _FENCE

@@ -1,7 +1,6 @@
 """From an empty folder to a first result, and back to what was recorded: by keys and by mouse."""
 
 import asyncio
-from pathlib import Path
 
 import pytest
 
@@ -100,7 +99,7 @@ async def test_a_daemon_that_a_screen_started_ends_by_itself(folder, monkeypatch
 
 
 @pytest.fixture
-def recorded(finished, tmp_path) -> Path:
+def recorded(finished, tmp_path):
     """Four drops of two chains, at two inclines."""
     return finished.copy(tmp_path).rename(tmp_path / "abba.session")
 

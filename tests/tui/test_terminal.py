@@ -7,9 +7,7 @@ import shutil
 import signal
 import sys
 import time
-from collections.abc import Iterator
 from contextlib import suppress
-from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
@@ -30,14 +28,14 @@ _NEEDS_TMUX = pytest.mark.skipif(
 class Terminal:
     """One tmux server with one window."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder):
         self.folder = folder
         self.socket = folder / "tmux"
 
-    def tmux(self, *arguments: str) -> str:
+    def tmux(self, *arguments):
         return run_program("tmux", "-S", self.socket, "-f", "/dev/null", *arguments).stdout
 
-    def begins(self, url: str) -> Path:
+    def begins(self, url):
         """Open a new session of two runs and come to the first; return its file."""
         protocol, session = self.folder / "keys.yaml", self.folder / "keys.session"
         protocol.write_text(short("[40 deg]", 2), "utf-8")
@@ -52,16 +50,16 @@ class Terminal:
         self.press("Enter")
         return session
 
-    def screen(self) -> str:
+    def screen(self):
         return re.sub(r"\s+", " ", self.tmux("capture-pane", "-p"))
 
-    def press(self, *keys: str) -> None:
+    def press(self, *keys):
         self.tmux("send-keys", *keys)
 
-    def enters(self, text: str) -> None:
+    def enters(self, text):
         """Press Enter by itself where a text stands, until it is gone, or the program is."""
 
-        def gone() -> bool:
+        def gone():
             time.sleep(1.2 * STILL_S)
             try:
                 if text not in self.screen():
@@ -73,10 +71,10 @@ class Terminal:
 
         until(gone)
 
-    def drops(self, number: int) -> None:
+    def drops(self, number):
         """Arm until chains fall: on a busy machine a board that is not heard of disarms itself."""
 
-        def fell() -> bool:
+        def fell():
             screen = self.screen()
             if "nothing fell" in screen and "Enter arm" in screen:
                 self.enters("Enter arm")
@@ -85,7 +83,7 @@ class Terminal:
         self.enters("Enter arm")
         until(fell, lambda: self.tmux("capture-pane", "-p"))
 
-    def sees(self, *texts: str) -> None:
+    def sees(self, *texts):
         until(
             lambda: all(text in self.screen() for text in texts),
             lambda: f"no {texts}:\n{self.tmux('capture-pane', '-p')}",
@@ -93,7 +91,7 @@ class Terminal:
 
 
 @pytest.fixture
-def terminal(folder: Path) -> Iterator[Terminal]:
+def terminal(folder):
     found = Terminal(folder)
     yield found
     with suppress(RigError):  # it may have ended with the test
@@ -152,7 +150,7 @@ def test_keys_have_one_reader_after_the_program_was_stopped(monkeypatch):
     assert done == [begins, ends, begins, ends, begins]
 
 
-def _daemon_of(folder: Path) -> int:
+def _daemon_of(folder):
     from rig.daemon.client import Client, Line
 
     client = Client(Line(folder / "rig.sock", "a test"))

@@ -138,7 +138,7 @@ def test_the_udev_rule_opens_every_kind_and_hides_boards_from_modem_manager(caps
 IS_HERE = bool(shutil.which("systemd-analyze"))
 
 
-def complaints_of(unit: Path) -> list[str]:
+def complaints_of(unit):
     """Lines that name the unit."""
     done = run_program("systemd-analyze", "verify", unit, code=None)
     return [line for line in done.stderr.splitlines() if unit.name in line]
