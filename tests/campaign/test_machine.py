@@ -26,6 +26,7 @@ from rig.records import Job
 from rig.session.reading import StateEntry
 from rig.session.schema import RunState
 from rig.wordings import NOTE, OPERATOR
+from tests.tables import cases
 
 JOB = Job(1, 1)
 NEXT = Job(2, 1)
@@ -81,11 +82,6 @@ def test_a_rejection_keeps_notes_and_can_be_taken_back():
     assert through(restored, on.Note(" "))[1] == [on.Log(JOB, "accepted", ())]
 
 
-def test_no_cause_no_rejection():
-    flow, _ = through(Flow(), *TO_RESULT, DONE)
-    assert step(flow, on.Reject("  ")) == (flow, ())
-
-
 def test_arming_that_comes_after_stop_is_undone():
     flow, _ = through(Flow(), *TO_RESULT[:4])
     assert flow.stage is Stage.ARMING
@@ -95,11 +91,17 @@ def test_arming_that_comes_after_stop_is_undone():
     assert effects == [on.Stop(), on.Stop()]
 
 
-@pytest.mark.parametrize("stage", list(Stage))
-def test_stop_is_carried_out_at_every_stage(stage):
-    flow, effects = step(Flow(stage=stage, job=JOB), on.StopRequest())
-    assert effects == (on.Stop(),)
-    assert flow.stage is (Stage.PREPARE if stage in BEFORE_RELEASE else stage)
+@cases
+def test_each_event_has_its_outcome_at_each_stage(event, arguments, outcomes):
+    values = [Job(*each) if isinstance(each, list) and each else each for each in arguments]
+    told = {stage: words.split() for stages, words in outcomes.items() for stage in stages.split()}
+    for stage in Stage:
+        flow = Flow(stage=stage, job=JOB, rejection=(WARM,))
+        after, effects = step(flow, getattr(on, event)(*values))
+        expected = [stage.name if word == "=" else word for word in told.pop(stage.name, ())]
+        seen = [after.stage.name, *(type(effect).__name__ for effect in effects)]
+        assert (seen == expected) if expected else ((after, effects) == (flow, ()))
+    assert not told
 
 
 @pytest.mark.parametrize("stage", [Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.LIVE])
@@ -110,12 +112,6 @@ def test_what_fails_says_why_and_can_be_tried_again(stage):
     assert (flow.stage, flow.trouble) == (Stage.PREPARE, "a gate is blocked\nclear it")
     flow, _ = through(flow, on.GoOn(JOB))
     assert flow.trouble == ""
-
-
-def test_a_drop_that_nobody_judged_is_judged():
-    flow, effects = through(Flow(stage=Stage.PREPARE, job=NEXT), on.Found(JOB))
-    assert effects == [on.Judge(JOB)]
-    assert flow.job == JOB
 
 
 tickets = st.integers(-1, 12)
