@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from rig.analysis.result import Measured
 from rig.cache.plain import from_text, to_text
 from rig.clock.calibration import TimeScale
-from rig.reasons import Reason, plain_reason
+from rig.reasons import plain_reason
 from tests.examples import examples
 from tests.refusals import refused
 from tests.tables import cases
@@ -20,7 +20,9 @@ from tests.tables import cases
 SCALARS = st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False) | st.text()
 KEYS = st.text() | st.integers() | st.tuples(st.integers(), st.integers())
 RECORDS = st.recursive(
-    SCALARS | st.builds(TimeScale, st.floats(allow_nan=False), st.floats(allow_nan=False)),
+    SCALARS
+    | st.builds(TimeScale, st.floats(allow_nan=False), st.floats(allow_nan=False))
+    | st.builds(plain_reason, st.text()),
     lambda inner: (
         st.lists(inner)
         | st.lists(inner).map(tuple)
@@ -56,7 +58,6 @@ def test_what_is_read_is_what_was_written(record):
 
 
 def test_numbers_that_json_lacks():
-    assert from_text(to_text((math.inf, -math.inf))) == (math.inf, -math.inf)
     assert math.isnan(from_text(to_text(math.nan)))
     assert type(from_text(to_text(np.float64(0.1)))) is float
 
@@ -72,12 +73,6 @@ def test_arrays(dtype):
 
 def test_what_no_comparison_sees_is_left_out():
     assert from_text(to_text(Measured(1.0, 2.0, shared=np.ones(3)))).shared is None
-
-
-def test_reasons_keep_their_words():
-    reason = plain_reason("a draught")
-    assert from_text(to_text(reason)) == reason
-    assert isinstance(from_text(to_text(reason)), Reason)
 
 
 @pytest.mark.parametrize("record", [Path(), object(), Stranger(1), {1, 2}, b"x", 1j])

@@ -69,22 +69,8 @@ def test_every_problem_of_a_protocol_has_its_line_and_column(told, tmp_path):
     assert not (tmp_path / "s").exists()
 
 
-def test_a_session_of_another_protocol_is_not_continued(told, finished, tmp_path):
-    session, other = finished.copy(tmp_path), tmp_path / "other.yaml"
-    before = session.read_bytes()
-    other.write_text(short().replace("tilt: 12 deg", "tilt: 13 deg"), "utf-8")
-    said = told("run", other, "--port", "sim://", "--session", session)
-    assert "was made with another protocol (short.yaml)" in said
-    assert session.read_bytes() == before
-
-
-def test_simulated_and_real_data_are_never_mixed(told, finished, protocol, tmp_path):
-    session = finished.copy(tmp_path)
-    before = session.read_bytes()
-    said = told("run", finished.protocol, "--port", "/dev/nonexistent", "--session", session)
-    assert "is a simulated session and /dev/nonexistent is a real port" in said
-    assert session.read_bytes() == before
-
+def test_simulated_and_real_data_are_never_mixed(told, protocol, tmp_path):
+    """That a simulated session is not continued at a real port is a story."""
     real = tmp_path / "real"
     text = Path(protocol).read_text("utf-8")
     Session.create(real, text, "p.yaml", simulated=False, origin="/dev/ttyACM0").close()

@@ -33,8 +33,10 @@ def test_what_is_typed_is_done_or_refused(story, call, here):
     for typed, *said in STORIES[story]:
         words, before = shlex.split(typed), files(here)
         code = said.pop(0) if said and isinstance(said[0], int) else 0
-        if words[0] == "cat":
+        if words[0] in {"cat", "edit"}:
             text = Path(words[1]).read_text("utf-8")
+            if words[0] == "edit":
+                Path(words[1]).write_text(text.replace(*words[2:]), "utf-8")
         else:
             done = call(*words, code=code)
             text = done.out + done.err

@@ -3,8 +3,7 @@
 The bench is the device with hands around it, see `tests.link.bench`.
 """
 
-from tests.link.suite_drop import CheckSuite, DropSuite, InputSuite, RefusalSuite
-from tests.link.suite_hold import HoldSuite
+from tests.link.suite_drop import CheckSuite, DropSuite, HoldSuite, InputSuite, RefusalSuite
 from tests.link.suite_line import LineSuite
 from tests.link.suite_memory import MemorySuite
 from tests.link.suite_safe import SafetySuite

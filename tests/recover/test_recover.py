@@ -270,7 +270,3 @@ def test_what_may_be_simulated_is_stamped_so(copy, tmp_path):
     again, missing = saved(copy, tmp_path)
     assert again["simulated"]
     assert any("stamped as simulated" in line for line in missing)
-
-
-def test_the_new_file_must_be_new(copy):
-    refused(SessionError, "already exists", save, examine(copy), copy)

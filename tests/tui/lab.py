@@ -28,8 +28,10 @@ from rig.tui.actions import ACTIONS
 from rig.tui.app import RigApp
 from rig.tui.context import Options
 from tests.cli.lab import ROOT
+from tests.tables import read_table
 from tests.waiting import PATIENCE_S
 
+PLAYS = read_table(__file__, "plays")
 KEYS = {action.name: action.keys for action in ACTIONS}
 _LOOKS = Path(__file__).with_name("looks.session.xz")
 
@@ -75,31 +77,64 @@ class Operator:
             assert time.monotonic() < end, f"{self.app.flow}\n{text_of(self.app)}"
             await self.pilot.pause(0.05)
 
-    async def at(self, stage: Stage) -> None:
-        await self.until(lambda: self.app.flow.stage is stage)
+    async def play(self, name: str) -> None:
+        """Do what ``plays.yaml`` says."""
+        for line in PLAYS[name]:
+            deed, _, words = line.partition(" ")
+            await getattr(self, deed)(*filter(None, words.split(" | ")))
 
-    async def arms(self, stage: Stage) -> None:
+    async def type(self, text: str) -> None:
+        await self.press(*text)
+
+    async def press_until(self, text: str, key: str = "enter") -> None:
+        """Press a key until a text stands on the screen."""
+        await self.until(lambda: self._pressed(key, lambda: text in flat(self.app)))
+
+    async def _pressed(self, key: str, true: Callable[[], bool]) -> bool:
+        await self.press(key)
+        return true()
+
+    async def mean(self) -> None:
+        """Say yes to what is asked, once it stands there to be read."""
+        await self.until(lambda: self._pressed("enter", lambda: len(self.app.screen_stack) == 1))
+
+    async def at(self, stage: Stage | str) -> None:
+        await self.until(lambda: self.app.flow.stage is _stage(stage))
+
+    async def arm(self, stage: Stage | str) -> None:
         """Arm, and again where a busy machine let board or daemon wait too long, until `stage`."""
 
         async def there() -> bool:
             if self.app.flow.stage is Stage.PREPARE:
                 await self.press("enter")
-            return self.app.flow.stage is stage
+            return self.app.flow.stage is _stage(stage)
 
         await self.until(there)
 
-    async def means(self) -> None:
-        """Say yes to what is asked, once it stands there to be read."""
+    async def open(self, dialog: str) -> None:
+        await self.until(lambda: type(self.app.screen).__name__ == dialog)
 
-        async def gone() -> bool:
-            await self.press("enter")
-            return len(self.app.screen_stack) == 1
+    async def close(self) -> None:
+        await self.until(lambda: len(self.app.screen_stack) == 1)
 
-        await self.until(gone)
+    async def drive(self) -> None:
+        await self.until(lambda: self.app.client and self.app.client.driving)
 
-    async def sees(self, *texts: str) -> None:
+    async def verdict(self, word: str) -> None:
+        await self.until(lambda: self.app.flow.verdict == word and self.app.flow.logged)
+
+    async def see(self, *texts: str) -> None:
         """Wait until all of these stand on the screen, however lines are broken."""
         await self.until(lambda: all(text in flat(self.app) for text in texts))
+
+    async def keep(self, *texts: str) -> None:
+        """See texts, and wait until the session has what they say."""
+        await self.see(*texts)
+        await self.until(lambda: self.app.flow.logged)
+
+
+def _stage(stage: Stage | str) -> Stage:
+    return stage if isinstance(stage, Stage) else Stage[stage]
 
 
 def flat(app: RigApp) -> str:
@@ -224,7 +259,7 @@ class Lab:
 
 async def session_on(op: Operator) -> None:
     """Have a session on the disk, and all that is known of its board shown."""
-    await op.until(lambda: op.app.client and op.app.client.driving)
+    await op.drive()
     await op.press("enter")
     await op.at(Stage.DEVICE)
     await op.until(lambda: op.app.follower.view and op.app.follower.indicators.known)

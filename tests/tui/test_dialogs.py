@@ -5,7 +5,6 @@ from dataclasses import replace
 from textual.widgets import Input
 
 from rig.campaign.machine import Stage
-from rig.tui.widgets.dialogs import Ask, Confirm, TextDialog
 from tests.cli.lab import drops_of, log_of
 from tests.tui.lab import DAEMON, listening
 
@@ -24,22 +23,22 @@ async def test_stop_works_on_every_page_and_in_every_dialog(lab):
             await stops(op, "f9")
         await op.press("3")
         for opens, dialog, key in (
-            ("l", Confirm, "f9"), ("l", Confirm, "escape"),
-            ("question_mark", TextDialog, "f9"), ("question_mark", TextDialog, "escape"),
+            ("l", "Confirm", "f9"), ("l", "Confirm", "escape"),
+            ("question_mark", "TextDialog", "f9"), ("question_mark", "TextDialog", "escape"),
         ):  # fmt: skip
             await op.press(opens)
-            await op.until(lambda dialog=dialog: isinstance(op.app.screen, dialog))
+            await op.open(dialog)
             await stops(op, key)
-            await op.until(lambda: len(op.app.screen_stack) == 1)
+            await op.close()
         await op.press("3")
-        await op.arms(Stage.RESULT)
+        await op.arm(Stage.RESULT)
         await op.press("n", *"warm")
-        await op.until(lambda: isinstance(op.app.screen, Ask))
+        await op.open("Ask")
         await stops(op, "f9")
         assert op.app.screen.query_one(Input).value == "warm"  # nothing typed is lost
         async with listening(op) as called:
             await op.press("escape")
-            await op.until(lambda: len(op.app.screen_stack) == 1)
+            await op.close()
         assert not called  # while typing it only leaves the line
         await op.press("ctrl+p")
         await op.until(lambda: len(op.app.screen_stack) == 2)
@@ -86,15 +85,15 @@ async def test_stop_works_in_every_state_that_lasts(lab):
         ):  # fmt: skip
             if stage is Stage.TESTING:
                 await op.press("l")
-                await op.until(lambda: isinstance(op.app.screen, Confirm))
-                await op.means()
-            await op.arms(stage)
+                await op.open("Confirm")
+                await op.mean()
+            await op.arm(stage)
             await stops(op, key)
             await op.at(Stage.PREPARE)
-            await op.sees(said)
+            await op.see(said)
         await op.until(lambda: op.app.follower.state.phase == "idle")
         op.app.driver.flow = replace(op.app.flow, countdown_s=0.1)
-        await op.arms(Stage.LIVE)
+        await op.arm(Stage.LIVE)
         await stops(op, "escape")
         await op.at(Stage.RESULT)  # what there is is kept and judged
     ((run, attempt),) = drops_of(lab.session)
@@ -106,15 +105,9 @@ async def test_stop_works_in_every_state_that_lasts(lab):
 async def test_the_release_is_tried_only_after_a_yes_and_is_no_run(lab):
     async with lab.ready() as op:
         async with listening(op) as called:
-            await op.press("l")
-            await op.sees("Test the release?", "once, for 80 ms", "Take the fence off")
-            await op.press("n")
-            await op.until(lambda: len(op.app.screen_stack) == 1)
+            await op.play("the release is not tried")
             assert not called
-        await op.press("l")
-        await op.means()
-        await op.sees("Release driven for 80 ms", "no gate saw an edge")
+        await op.play("the release is tried")
         assert op.app.page == "device"
-        await op.press("3")
-        await op.sees("Run 1 of 3", "Enter arms")
+        await op.play("the run is still to come")
         assert {line.state for line in op.app.follower.state.runs} == {"planned"}

@@ -22,16 +22,16 @@ def test_all_that_waits_before_a_hanging_daemon_is_said_is_less_than_a_second():
 async def test_a_daemon_that_hangs_while_armed_is_said_and_is_not_armed_when_it_goes_on(lab):
     lab.patience_s = client._SILENT_S
     async with lab.ready(countdown_s=600.0) as op:
-        await op.arms(Stage.COUNTDOWN)
+        await op.arm(Stage.COUNTDOWN)
         os.kill(lab.daemons[0].pid, signal.SIGSTOP)
         try:
-            await op.sees("no daemon: no answer for", "an armed board has switched itself off")
+            await op.see("no daemon: no answer for", "an armed board has switched itself off")
             assert op.app.flow.stage is Stage.PREPARE
             await op.press("f9")
-            await op.sees("STOP NOT CONFIRMED: switch the release's supply off")
+            await op.see("STOP NOT CONFIRMED: switch the release's supply off")
         finally:
             os.kill(lab.daemons[0].pid, signal.SIGCONT)
-        await op.sees("the daemon was lost before the release: nothing fell")
+        await op.see("the daemon was lost before the release: nothing fell")
         await op.until(lambda: op.app.follower.state.line(1).state == "interrupted")
         await op.until(lambda: op.app.follower.state.phase == "idle")
 
@@ -40,7 +40,7 @@ async def test_a_disk_that_takes_nothing_is_said(lab):
     async with lab.ready() as op:
         with closing(sqlite3.connect(lab.session, PATIENCE_S, check_same_thread=False)) as other:
             await asyncio.to_thread(other.execute, "BEGIN IMMEDIATE")
-            await op.sees("the disk has not finished a write for", "armed board has switched")
+            await op.see("the disk has not finished a write for", "armed board has switched")
         await op.until(lambda: "the disk" not in text_of(op.app))
 
 
@@ -50,10 +50,10 @@ async def test_a_wrong_protocol_is_located_and_read_again_when_it_is_mended(lab,
 
     async with lab.operator() as op:
         await op.until(lambda: op.app.client.driving)
-        await op.sees("fence.yaml:8:11:", "found 'many'")
+        await op.see("fence.yaml:8:11:", "found 'many'")
         await op.press("enter")
         lab.protocol.write_text(good, "utf-8")
-        await op.sees("mended")
+        await op.see("mended")
         assert op.app.flow.stage is Stage.PROTOCOL
 
 
@@ -61,7 +61,7 @@ async def test_a_daemon_of_another_port_is_named(lab):
     lab.url = "sim://?seed=99"
 
     async with lab.operator() as op:
-        await op.sees("the daemon has sim://?seed=3, not sim://?seed=99", "--name")
+        await op.see("the daemon has sim://?seed=3, not sim://?seed=99", "--name")
 
 
 PULLED = ("✗ the port is lost", "reconnecting")
@@ -90,21 +90,21 @@ async def test_a_pulled_cable_is_said_on_every_screen(cabled):
     async with lab.operator(countdown_s=0.1) as op:
         await op.until(lambda: op.app.follower.state.link == "up")
         pull(processes, lab)  # before there is a session
-        await op.sees(*PULLED, "HOME")
+        await op.see(*PULLED, "HOME")
         plug(processes)
         await op.until(lambda: op.app.follower.state.link == "up")
         await session_on(op)
         pull(processes, lab)
         for page in "123456":
             await op.press(page)
-            await op.sees(*PULLED)
+            await op.see(*PULLED)
         plug(processes)
         await mended(op)
-        await op.sees("the port was lost and is back")
+        await op.see("the port was lost and is back")
         await op.press("enter")
-        await op.arms(Stage.RESULT)
+        await op.arm(Stage.RESULT)
         pull(processes, lab)
-        await op.sees(*PULLED, "RESULT")
+        await op.see(*PULLED, "RESULT")
         assert op.app.flow.verdict == "accepted"  # stays until it is acknowledged
 
 
@@ -117,17 +117,17 @@ def test_a_drop_that_falls_without_its_line_is_found_when_it_is_back(cabled, fau
             await op.until(lambda: op.app.follower.state.link == "up")
             await session_on(op)
             await op.press("enter")
-            await op.arms(Stage.LIVE)
+            await op.arm(Stage.LIVE)
             job = op.app.flow.job
             await asyncio.to_thread(fault, processes, lab)
             if fault is pull:
-                await op.sees("the port is lost")
+                await op.see("the port is lost")
                 plug(processes)
             else:
-                await op.sees("no daemon")
+                await op.see("no daemon")
             await op.at(Stage.RESULT)
             again = f"attempt {job.attempt}" * (job.attempt > 1)  # the first goes without saying
-            await op.sees("Run 1 of 2", again, "ACCEPTED")
+            await op.see("Run 1 of 2", again, "ACCEPTED")
         return job
 
     job = asyncio.run(work())

@@ -30,8 +30,7 @@ async def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(folder,
     options = Options(socket=folder / "rig.sock", countdown_s=0.2, still_s=0.0)
     async with at_screen(options) as op:
         app = op.app
-        await op.sees("HOME", "Try it", "New experiment", "no rig yet", "Enter open")
-        await op.press("escape")
+        await op.play("nothing is here yet")
         await op.pilot.pause(0.3)
         assert "✗" not in flat(app)
         assert "supply" not in flat(app)
@@ -49,11 +48,11 @@ async def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(folder,
         )
         await press("enter")
         await op.at(Stage.PREPARE)
-        await op.sees("Run 1 of 10", "Enter arms")
+        await op.see("Run 1 of 10", "Enter arms")
         await op.pilot.pause(0.7)  # it stands there to be read
         await press("enter")
         await op.at(Stage.RESULT)
-        await op.sees("g = 9.")
+        await op.see("g = 9.")
         trial = app.client.daemon
         assert trial.poll() is None
     assert trial.poll() is not None
@@ -73,10 +72,7 @@ async def test_a_pico_that_waits_is_flashed_by_a_command_that_there_is(
     monkeypatch.setattr(commands, "_run", record)
 
     async with at_screen(Options(socket=folder / "rig.sock", still_s=0.0)) as op:
-        await op.sees("Pico: put the firmware on it")
-        await op.press("down", "down", "enter")
-        await op.sees("Write the firmware?")
-        await op.means()
+        await op.play("a Pico gets its firmware")
         await op.until(lambda: asked)
     assert asked == [("flash", "pico")]
 
@@ -114,13 +110,7 @@ async def test_drops_are_compared_and_files_are_written_from_inside(recorded, tm
         assert notes(session) == {Job(2, 1): "a [draught]"}
 
     async with at_screen(Options(session=mine, offline=True, still_s=0.0), (120, 36)) as op:
-        await op.sees("drop 1 of 4")
-        await op.press("down")
-        await op.sees("drop 2 of 4", "note: a [draught]")
-        await op.press("e")
-        await op.sees("Write files?", "mine.csv")
-        await op.means()
-        await op.sees("CSV files: ")
+        await op.play("drops are compared and written")
     assert (tmp_path / "mine.csv" / "edges.csv").is_file()
 
 
@@ -134,32 +124,12 @@ async def test_a_session_is_looked_at_without_a_rig_and_another_one_is_picked(re
     assert entries["broken.session"].trouble
 
     async with at_screen(Options(session=other, offline=True), (120, 36)) as op:
-
-        async def enter():  # which right behind letters may be part of what was pasted
-            await op.press("enter")
-            return len(op.app.screen_stack) == 1
-
-        await op.sees("No drop recorded yet")
-        await op.press("o")
-        await op.sees("abba.session", "4 drops", "broken.session")
-        await op.press(*"abba")
-        await op.until(enter)
-        await op.sees("drop 1 of 4", "abba.session")
-        await op.press("6", "up")
-        await op.sees("drop 4 of 4")
-        await op.press("o")
-        await op.sees("broken.session")
-        await op.press(*"broken")
-        await op.until(enter)
-        await op.sees("✗", "drop 4 of 4")
+        await op.play("another session is picked")
 
 
 async def test_the_session_page_says_how_many_taught_each_other(recorded):
     async with at_screen(Options(session=recorded, offline=True), (120, 36)) as op:
-        await op.press("5")
-        await op.sees("joint fit of 4 runs", "separation")
-        await op.press("y", "y")
-        await op.sees("skew")
+        await op.play("how many taught each other is said")
 
 
 LOOKS = 5
@@ -203,8 +173,8 @@ async def test_a_protocol_and_stop_are_clicked(lab, fence):
 
     async with lab.operator(files=(broken, lab.protocol, other)) as op:
         # What can be used, and not the first of the list.
-        await op.sees("A short fence", "Ready experiments")
-        await op.until(lambda: op.app.client and op.app.client.driving)
+        await op.see("A short fence", "Ready experiments")
+        await op.drive()
 
         async def chosen():  # again, should the list have been laid out anew under the pointer
             rows = [row.title for row in op.app.desk.rows]
