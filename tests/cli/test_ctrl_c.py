@@ -21,14 +21,6 @@ from tests.programs import run_program
 from tests.tables import read_table
 
 STRUCK = "import os, signal; os.kill(os.getpid(), signal.SIGINT)"
-LOADING = f"""
-import rig.cli, rig.__main__
-def load(name):
-    {STRUCK}
-rig.cli.import_module = load
-rig.__main__.sys.argv[1:] = ["check", "x"]
-rig.__main__.start()
-"""
 BEFORE = f"""
 import sys
 sys.modules.pop("signal", None)
@@ -49,7 +41,7 @@ rig.__main__.start()
 """
 
 
-@pytest.mark.parametrize(("program", "code"), [(BEFORE, 130), (LOADING, 130), (ENDING, 0)])
+@pytest.mark.parametrize(("program", "code"), [(BEFORE, 130), (ENDING, 0)])
 def test_ctrl_c_where_no_command_is_at_work(program, code, unread):
     command = [sys.executable, "-c", program]
     assert "Traceback" not in run_program(*command, code=code).stderr

@@ -55,10 +55,9 @@ def test_the_exit_code_stays_when_nobody_reads_the_message(tmp_path, unread):
     assert done.returncode == 1
 
 
-@pytest.mark.parametrize(
-    ("ends", "code"), [("raise SystemExit(7)", 7), ("raise KeyboardInterrupt", 130)]
-)
-def test_other_ends_are_no_internal_errors(ends, code, tmp_path):
-    done = ended(BROKEN.format(ends, AT_WORK, ["check", "x"]), tmp_path)
+@pytest.mark.parametrize("when", [AT_WORK, "broken"], ids=["at work", "while it loads"])
+@pytest.mark.parametrize(("ends", "code"), [("SystemExit(7)", 7), ("KeyboardInterrupt", 130)])
+def test_other_ends_are_no_internal_errors(when, ends, code, tmp_path):
+    done = ended(BROKEN.format(f"raise {ends}", when, ["check", "x"]), tmp_path)
     assert done.returncode == code
     assert list(tmp_path.iterdir()) == []

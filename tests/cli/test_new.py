@@ -10,35 +10,24 @@ from rig.protocol.draft import SCENES, Draft, draft_text
 from rig.protocol.measurable import check_recordable
 from rig.protocol.reader import parse, read
 from tests.cli.lab import Terminal
+from tests.tables import read_table
 
-
-def drafted(scene, gates, **changes):
-    body, fence = scene in {"object", "track"}, scene == "picket-fence"
-    usual = {
-        "rods": 1 if body else 8 if fence else 25,
-        "length": "350 mm" if fence else "1165 mm",
-        "diameter": "20 mm" if body else "25 mm" if fence else "12.7 mm",
-        "drop": "400 mm ± 2 mm" if fence else "900 mm" if body else "180 mm ± 2 mm",
-        "inclines": "3 deg" if scene == "track" else "40 deg, 60 deg",
-        "repeats": 8,
-    }
-    return Draft(f'What "{scene}" says', scene, gates, **(usual | changes))
+DRAFTS = read_table(__file__, "drafts")
 
 
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.parametrize("gates", [2, 3, 4, 6, 12])
 def test_any_number_of_gates_finds_a_place(scene, gates):
-    protocol = parse(draft_text(drafted(scene, gates)))
+    sides, answers = DRAFTS[scene]
+    draft = Draft(f'What "{scene}" says', scene, gates, repeats=8, **answers)
+    protocol = parse(draft_text(draft))
     check_recordable(protocol)
     assert protocol.title == f'What "{scene}" says'
     assert len(protocol.gates.gates) == gates
     assert len({(gate.side, gate.height) for gate in protocol.gates.gates}) == gates
-    assert {gate.side for gate in protocol.gates.gates} == (
-        {"impact", "free"} if scene == "two-chains" else {"impact"} if scene == "one-chain"
-        else {"free"}
-    )  # fmt: skip
+    assert {gate.side for gate in protocol.gates.gates} == {*sides}
     assert (protocol.track is not None) == (scene == "track")
-    trial = parse(draft_text(drafted(scene, gates).trial()))
+    trial = parse(draft_text(draft.trial()))
     assert (len(trial.plan.inclines), trial.plan.repeats) == (1, 4)
 
 

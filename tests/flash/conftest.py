@@ -1,50 +1,25 @@
 """An avrdude that only notes how it was called."""
 
-import json
-import sys
-from dataclasses import dataclass
-from pathlib import Path
+import shlex
+from types import SimpleNamespace
 
 import pytest
-
-_SCRIPT = """#!{python}
-import json, pathlib, sys
-folder = pathlib.Path(__file__).parent
-(folder / "argv.json").write_text(json.dumps(sys.argv[1:]))
-sys.stderr.write((folder / "says").read_text())
-sys.exit(int((folder / "code").read_text()))
-"""
-
-
-@dataclass(frozen=True)
-class FakeAvrdude:
-    """The program, in a folder of its own."""
-
-    path: Path
-
-    def will(self, says, code):
-        """Choose how it will end."""
-        (self.path.parent / "says").write_text(says)
-        (self.path.parent / "code").write_text(str(code))
-
-    @property
-    def argv(self):
-        """How it was called, or `None`."""
-        file = self.path.parent / "argv.json"
-        return json.loads(file.read_text()) if file.exists() else None
 
 
 @pytest.fixture
 def avrdude(tmp_path, monkeypatch):
-    folder = tmp_path / "programs"
-    folder.mkdir()
-    path = folder / "avrdude"
-    path.write_text(_SCRIPT.format(python=sys.executable))
-    path.chmod(0o755)
-    monkeypatch.setenv("PATH", str(folder))
-    fake = FakeAvrdude(path)
-    fake.will("Writing | ######## | 100% 1.92s\n", 0)
-    return fake
+    """Have it as the only program there is; it says and ends as it `will`."""
+    path, noted = tmp_path / "programs" / "avrdude", tmp_path / "programs" / "noted"
+    path.parent.mkdir()
+    monkeypatch.setenv("PATH", str(path.parent))
+
+    def will(says, code):
+        note = f"printf '%s\\n' \"$@\" > {noted}"
+        path.write_text(f"#!/bin/sh\n{note}\nprintf %s {shlex.quote(says)} >&2\nexit {code}\n")
+        path.chmod(0o755)
+
+    will("Writing | ######## | 100% 1.92s\n", 0)
+    return SimpleNamespace(path=path, noted=noted, will=will)
 
 
 @pytest.fixture

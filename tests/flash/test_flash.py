@@ -30,7 +30,7 @@ def test_a_board_is_flashed_and_asked(board, avrdude, flash):
     assert done.out.count("\n") == 1
     assert f"writing {VERSION} (" in done.err
     assert "Writing | ######## | 100%" in done.err
-    argv = list(avrdude.argv)
+    argv = avrdude.noted.read_text().splitlines()
     argv.remove("-D")
     assert options(argv) == {
         "-p": "m2560" if board == "mega" else "m328p",
@@ -47,7 +47,7 @@ def test_another_image_and_another_avrdude(avrdude, flash, tmp_path, monkeypatch
     monkeypatch.setenv("PATH", str(tmp_path / "empty"))
     with PtyBoard(**NAMES) as there:
         flash("--port", there.path, "--hex", hex_file, "--avrdude", avrdude.path)
-    assert f"flash:w:{hex_file}:i" in avrdude.argv
+    assert f"flash:w:{hex_file}:i" in avrdude.noted.read_text()
 
 
 # What avrdude 6.3 and 7.1 say.
@@ -75,7 +75,7 @@ def test_nothing_is_flashed_where_something_is_wrong(
         places = {"SILENT": path, "BROKEN": broken_program(tmp_path), "UNO": UNO.image_path}
         done = flash(*(places.get(word, word) for word in arguments), code=code)
     assert message in done.err
-    assert avrdude.argv is None
+    assert not avrdude.noted.exists()
 
 
 def test_avrdude_is_missing(flash, tmp_path, monkeypatch):
@@ -89,7 +89,7 @@ def test_a_port_somebody_uses(avrdude, flash):
     with silent_port() as path, serial.Serial(path, exclusive=True):
         done = flash("--port", path, code=4)
     assert "another program uses it" in done.err
-    assert avrdude.argv is None
+    assert not avrdude.noted.exists()
 
 
 @pytest.mark.parametrize(
