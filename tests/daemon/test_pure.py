@@ -256,12 +256,16 @@ def test_a_client_gives_signs_of_life_by_itself_unless_it_is_armed(deeds, signs)
     assert [asked.args[0] for asked in client.line.ask.mock_calls].count("renew") == signs
 
 
-def test_a_session_that_is_closed_is_shown_to_nobody_any_more(tmp_path):
+def test_a_session_is_shown_until_it_is_closed_and_blind_until_it_is_not(tmp_path):
     protocol = tmp_path / "fence.yaml"
-    protocol.write_text(FENCE.replace("RUNS", "1"), "utf-8")
+    protocol.write_text(FENCE.replace("RUNS", "1") + "blind: true\n", "utf-8")
     rig = Controller("sim://", PublishedState())
     rig.open_session(str(protocol), str(tmp_path / "session"))
-    assert rig.published.get("session")["path"] == str(tmp_path / "session")
+    about = rig.published.get("session")
+    assert (about["path"], about["blind"]) == (str(tmp_path / "session"), True)
+    rig.unblind()
+    assert rig.session.unblinded
+    assert rig.published.get("session") == about | {"blind": False}
     rig.close()
     assert rig.published.get("session") is None
     assert rig.published.get("link")["state"] == "closed"

@@ -215,9 +215,10 @@ def test_who_is_held_up_says_by_what_and_whether_anything_is_armed(box, monkeypa
     worker = box.worker
 
     def stalled(since_s, disk_s):
-        monkeypatch.setattr(worker, "_due_s", box.now() - since_s)
-        monkeypatch.setattr(worker, "disk_s", lambda: disk_s)
-        trouble = worker.stall()
+        with monkeypatch.context() as patch:
+            patch.setattr(worker, "_due_s", box.now() - since_s)
+            patch.setattr(worker, "disk_s", lambda: disk_s)
+            trouble = worker.stall()
         return trouble and trouble.reasons[0].code
 
     assert [stalled(2.0 * STALL_S, disk_s) for disk_s in (0.0, 1.0)] == ["held_up", "disk_slow"]
@@ -225,7 +226,7 @@ def test_who_is_held_up_says_by_what_and_whether_anything_is_armed(box, monkeypa
     box.arm()
     armed = [stalled(2.0 * STALL_S, disk_s) for disk_s in (0.0, 1.0)]
     assert armed == ["held_up_armed", "disk_slow_armed"]
-    monkeypatch.undo()
+    box.turned()
     assert box.asked(lambda _: box.clock.sleep(1.5 * STALL_S) or worker.stall()) is not None
 
 
