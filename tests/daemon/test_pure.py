@@ -20,12 +20,17 @@ from rig.daemon.lease import LEASE_S, Lease
 from rig.daemon.listener import Door
 from rig.daemon.replica import Replica
 from rig.daemon.worker import Worker
+from rig.link import messages as wire
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
+from rig.link.transcript import Incoming
 from rig.reasons import rig_error
 from rig.recorder.controller import Controller
+from rig.recorder.feed import StateFeed
 from rig.recorder.interrupts import Interrupts
 from rig.recorder.published import EDGES_LIMIT, PublishedState
+from rig.recorder.recorder import NullSink
+from rig.session.schema import RunState
 from tests.refusals import refused
 from tests.tables import cases, read_table
 from tests.waiting import PATIENCE_S
@@ -73,8 +78,9 @@ def test_any_line_is_a_request_or_is_refused_with_a_code(line):
 
 
 @cases
-def test_what_is_no_request_gets_its_code(line, code):
-    assert rpc.read_line(line.encode()).code == getattr(rpc, code)
+def test_what_is_no_request_gets_its_code(line, code, number):
+    read = rpc.read_line(line.encode())
+    assert (read.code, read.id) == (getattr(rpc, code), number)
 
 
 def test_a_line_nested_without_end_is_no_request():
@@ -238,6 +244,26 @@ def test_a_signal_waits_only_while_something_falls():
         interrupts._note()
         assert client.call("collect") == {}
         refused(KeyboardInterrupt, "", client.call, method)
+
+
+def test_what_falls_is_shown_while_it_falls_and_frames_out_of_order_are_not():
+    published = PublishedState()
+    feed, label = StateFeed(published), wire.pack_label(1, 1)
+    feed.state(1, 1, RunState.ARMED, ())
+    frames = [(0, (110, 1)), (3, (140, 1), (150, 3)), (1, (120, 0))]
+    events = [wire.EventsFrame(label, at, wire.pack_events(of)) for at, *of in frames]
+    for message in (events[0], wire.Fired(100), *events):
+        feed.know(Incoming(0, 0, message))
+    drop = published.get("drop")
+    assert (drop["state"], drop["fire_tick"], drop["events"]) == ("fired", 100, 5)
+    assert published.snapshot()["state"]["edges"] == [(10, 0, 1), (50, 1, 1)]
+    assert (published.get("gates"), published.get("phase")) == ({"blocked": 3}, "recording")
+
+
+def test_what_has_no_session_keeps_nothing_and_can_arm_nothing():
+    sink = NullSink()
+    assert sink.log_bytes("rx", 0, b"x") is None
+    refused(AttributeError, "add_state", getattr, sink, "add_state")
 
 
 ARMED = ("arm", 1, 1)

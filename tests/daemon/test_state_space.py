@@ -181,6 +181,21 @@ def test_a_test_of_the_release_tells_what_was_seen_of_it(box):
     assert seen["release_sense_s"] == pytest.approx(0.012, rel=0.01)
 
 
+def test_a_stop_before_a_test_of_the_release_lets_nothing_go(box, monkeypatch):
+    """Also where no ABORT goes past the worker, as at a simulated board."""
+    monkeypatch.setattr(box.worker, "_abort_past", lambda: False)
+    box.trouble = Trouble("stopped", "written")  # ARM
+    assert isinstance(box.asked(lambda c: c.test_release()), StoppedError)
+    assert (box.fell, box.phase) == ([], Phase.IDLE)
+
+
+def test_what_was_heard_of_a_port_that_is_gone_is_on_the_disk(box):
+    box.pull()
+    box.asked(lambda c: c.recorder.look())
+    assert box.worker.published.get("link")["state"] == "down"
+    assert box.worker.controller.session.pending == 0
+
+
 def test_what_a_test_of_the_release_left_on_the_board_is_in_nobodys_way(box):
     box.board.lab.drop = lambda _label: []
     device, label = box.worker.controller.recorder.device, pack_label(TEST_RUN, 1)
