@@ -307,54 +307,31 @@ def test_create_in_a_missing_folder(tmp_path):
     refused(SessionError, "No such file", make, tmp_path / "no" / "such.rig")
 
 
-def database(path, *sql):
-    with closing(sqlite3.connect(path)) as connection:
-        for statement in ("CREATE TABLE other (key, value)", *sql):
-            connection.execute(statement)
-        connection.commit()
-
-
-def altered(sql):
-    def make_altered(path):
-        make(path).close()
-        alter(path, sql)
-
-    return make_altered
-
-
-def hollow(path):
-    database(path, f"PRAGMA application_id = {APPLICATION_ID}")
-
-
-def cut(path):
-    make(path).close()
-    path.write_bytes(path.read_bytes()[:5000])
-
-
-LATER_FORMAT = f"PRAGMA user_version = {SCHEMA_VERSION + 1}"
-UNDATED = "UPDATE meta SET value = 'x' WHERE key = 'created'"
-NOISE = random.Random(1).randbytes(50_000)
-NOTHING = "not a session: there is nothing of a session in it"
-NO_SESSIONS = {
-    "missing": (lambda path: None, "no session at", "No such file"),
-    "folder": (lambda path: path.mkdir(), "folder", "folder"),
-    "empty": (lambda path: path.touch(), "empty", "not a session: it is empty"),
-    "text": (lambda path: path.write_text("run,state\n" * 400), "not a session", NOTHING),
-    "noise": (lambda path: path.write_bytes(NOISE), "not a session", NOTHING),
-    "head": (lambda path: path.write_bytes(b"SQLite format 3\0"), "damaged|not a s", NOTHING),
-    "byte": (lambda path: path.write_bytes(b"x"), "not a session", NOTHING),
-    "foreign": (database, "another program's", "it is another program's SQLite database"),
-    "newer": (altered(LATER_FORMAT), "newer rig", "not a session: it was written by a newer rig"),
-    "undated": (altered(UNDATED), "when it was made", None),
-    "hollow": (hollow, "not a session|cannot be used|damaged", None),
-    "cut": (cut, "damaged", None),
-}
+def put_there(path, kind, what):
+    """Make what is no session, or not one any more."""
+    sql = f"{what}".format(later=SCHEMA_VERSION + 1, application=APPLICATION_ID)
+    match kind:
+        case "folder":
+            path.mkdir()
+        case "text":
+            path.write_text(what)
+        case "noise":
+            path.write_bytes(random.Random(1).randbytes(50_000))
+        case "database":
+            with closing(sqlite3.connect(path)) as connection:
+                connection.executescript(f"CREATE TABLE other (key, value); {sql}")
+        case "altered":
+            make(path).close()
+            alter(path, sql)
+        case "cut":
+            make(path).close()
+            path.write_bytes(path.read_bytes()[:5000])
 
 
 @pytest.mark.parametrize("readonly", [False, True])
-@pytest.mark.parametrize(("prepare", "words", "told"), NO_SESSIONS.values(), ids=NO_SESSIONS)
-def test_what_is_no_session(path, prepare, words, told, readonly, call):
-    prepare(path)
+@cases
+def test_what_is_no_session(path, kind, what, words, told, readonly, call):
+    put_there(path, kind, what)
     before = path.read_bytes() if path.is_file() else None
     error = refused(SessionError, words, Session.open, path, readonly=readonly)
     assert error.hint
