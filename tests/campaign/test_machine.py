@@ -17,8 +17,8 @@ from rig.recorder.run_lines import RunLine
 from rig.records import Job
 from rig.session.reading import StateEntry
 from rig.session.schema import RunState
-from rig.wordings import NOTE, OPERATOR
-from tests.tables import cases
+from rig.wordings import NOTE
+from tests.tables import cases, read_table
 
 JOB = Job(1, 1)
 NEXT = Job(2, 1)
@@ -59,19 +59,11 @@ def test_a_run_goes_from_the_protocol_to_its_verdict():
 
 def test_a_rejection_keeps_notes_and_can_be_taken_back():
     flow, _ = through(Flow(), *TO_RESULT, DONE)
-    noted, effects = through(flow, on.Note("warm"))
-    assert effects == [on.Log(JOB, "accepted", (WARM,))]
-    rejected, effects = through(
-        noted, on.Reject(" a cough "), on.Reject("a sneeze"), on.Note("cold")
-    )
-    assert effects[0] == on.Log(JOB, "rejected", (plain_reason("a cough", OPERATOR), WARM))
-    restored, effects = through(rejected, on.Restore())
-    assert effects == [
-        on.Log(JOB, "accepted", (plain_reason("cold", NOTE),))
-    ]  # a later note is instead of it
-    assert step(restored, on.Restore()) == (restored, ())
-    assert step(restored, on.Note("cold")) == (restored, ())
-    assert through(restored, on.Note(" "))[1] == [on.Log(JOB, "accepted", ())]
+    for event, words, logged in read_table(__file__, "notes"):
+        flow, effects = through(flow, getattr(on, event)(*words))
+        state, told = logged or ("", ())
+        reasons = tuple(plain_reason(text, code) for code, text in told)
+        assert effects == [on.Log(JOB, state, reasons)] * bool(logged), (event, words)
 
 
 @cases

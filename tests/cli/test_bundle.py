@@ -176,37 +176,24 @@ def test_other_versions_may_differ_in_the_last_digits(files, call, tmp_path):
     assert "9 digits agree" in call("verify", other).out
 
 
-def archive(folder, *members, how=zipfile.ZIP_STORED):
-    path = folder / "made.eln"
-    with zipfile.ZipFile(path, "w", how) as made:
-        for name, content in members:
-            made.writestr(name, content)
+def no_bundle(kind, folder, whole):
+    path, data = folder / "made.eln", whole.read_bytes()
+    if kind == "folder":
+        return folder
+    if kind == "cut":
+        path.write_bytes(data[:1000])
+    elif kind == "misled":  # where its directory begins: files are then looked for elsewhere
+        path.write_bytes(data[:-6] + b"\1" * 4 + bytes(2))
+    elif kind != "absent":
+        name, how = ("a", zipfile.ZIP_DEFLATED) if kind == "packed" else ("../../a", 0)
+        with zipfile.ZipFile(path, "w", how) as made:
+            made.writestr(f"record/{name}", bytes(10**6))
     return path
 
 
-def cut(folder, whole, size, end=b""):
-    path = folder / "cut.eln"
-    path.write_bytes(whole.read_bytes()[:size] + end)
-    return path
-
-
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (lambda folder, _: folder / "absent.eln", "No such file"),
-        (lambda folder, _: folder, "no record/SHA256SUMS"),
-        (lambda folder, _: archive(folder, ("record/../../a", "x")), "outside of record/"),
-        (
-            lambda folder, _: archive(folder, ("record/a", bytes(10**7)), how=zipfile.ZIP_DEFLATED),
-            "is compressed",
-        ),
-        (lambda folder, whole: cut(folder, whole, 1000), "cannot be read"),
-        # Where the directory begins: files are then looked for elsewhere.
-        (lambda folder, whole: cut(folder, whole, -6, b"\1" * 4 + bytes(2)), "was altered"),
-    ],
-)
-def test_what_is_no_bundle_is_refused_in_words(make, said, bundle, call, tmp_path):
-    path = make(tmp_path, bundle)
+@cases
+def test_what_is_no_bundle_is_refused_in_words(kind, said, bundle, call, tmp_path):
+    path = no_bundle(kind, tmp_path, bundle)
     done = call("verify", path, code=2)
     assert str(path) in done.err
     assert "hint: " in done.err

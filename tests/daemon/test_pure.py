@@ -6,6 +6,8 @@ import random
 import socket
 import threading
 from concurrent.futures import Future, ThreadPoolExecutor
+from sys import intern
+from types import SimpleNamespace
 from unittest.mock import Mock
 
 import pytest
@@ -16,7 +18,7 @@ from bench.process_fixture import FENCE
 from rig import errors
 from rig.daemon import rpc
 from rig.daemon.client import Client, Line
-from rig.daemon.lease import LEASE_S, Lease
+from rig.daemon.lease import Lease
 from rig.daemon.listener import Door
 from rig.daemon.replica import Replica
 from rig.daemon.worker import Worker
@@ -108,38 +110,15 @@ def test_who_is_no_daemon_is_told_so(tmp_path, told, why):
         refused(errors.DeviceError, why, client.result)
 
 
-class Time:
-    """A clock that is set by hand."""
-
-    now = 0.0
-
-    def __call__(self):
-        return self.now
-
-
 def test_one_client_has_control_until_it_is_not_heard():
-    time = Time()
-    lease = Lease(time)
-    lease.take("one", "rig run 1")
-    refused(errors.ControlError, "rig run 1 has control", lease.take, "two", "tui 2")
-    refused(errors.ControlError, "rig run 1 has it", lease.require, "two")
-    time.now = LEASE_S - 0.1
-    lease.heard("two")  # says nothing of the first
-    lease.heard("one")
-    time.now += LEASE_S - 0.1
-    lease.require("one")
-    time.now += 0.2
-    assert lease.holder is None
-    lease.require("one")  # nobody took it meanwhile, so that it goes on
-    lease.heard("one")
-    assert lease.holder == "one"
-    time.now += LEASE_S
-    lease.take("two", "tui 2")
-    lease.heard("one")
-    assert lease.holder == "two"
-    assert not lease.release("one")
-    assert lease.release("two")
-    assert lease.holder is None
+    time = SimpleNamespace(now=0.0)
+    lease = Lease(lambda: time.now)
+    for time.now, deed, *words, outcome in read_table(__file__, "lease"):
+        try:
+            came = lease.holder if deed == "holder" else getattr(lease, deed)(*map(intern, words))
+        except errors.ControlError as error:
+            came = error.message
+        assert came == outcome, (time.now, deed, *words)
 
 
 def test_a_door_that_was_lost_is_never_this_daemons_again(tmp_path, monkeypatch):
