@@ -117,6 +117,12 @@ class Operator:
     async def close(self) -> None:
         await self.until(lambda: len(self.app.screen_stack) == 1)
 
+    async def stop(self, key: str) -> None:
+        """Press a key and see that the daemon is asked to stop, and has done so."""
+        async with listening(self) as called:
+            await self.press(key)
+            await self.until(lambda: "stop answered" in called)
+
     async def drive(self) -> None:
         await self.until(lambda: self.app.client and self.app.client.driving)
 

@@ -9,32 +9,9 @@ from tests.cli.lab import drops_of, log_of
 from tests.tui.lab import DAEMON, listening
 
 
-async def stops(op, key):
-    """Press a key and see that the daemon is asked to stop, and has done so."""
-    async with listening(op) as called:
-        await op.press(key)
-        await op.until(lambda: "stop answered" in called)
-
-
 async def test_stop_works_on_every_page_and_in_every_dialog(lab):
     async with lab.ready() as op:
-        for page in "123456":
-            await op.press(page)
-            await stops(op, "f9")
-        await op.press("3")
-        for opens, dialog, key in (
-            ("l", "Confirm", "f9"), ("l", "Confirm", "escape"),
-            ("question_mark", "TextDialog", "f9"), ("question_mark", "TextDialog", "escape"),
-        ):  # fmt: skip
-            await op.press(opens)
-            await op.open(dialog)
-            await stops(op, key)
-            await op.close()
-        await op.press("3")
-        await op.arm(Stage.RESULT)
-        await op.press("n", *"warm")
-        await op.open("Ask")
-        await stops(op, "f9")
+        await op.play("stop on every page and in every dialog")
         assert op.app.screen.query_one(Input).value == "warm"  # nothing typed is lost
         async with listening(op) as called:
             await op.press("escape")
@@ -42,7 +19,7 @@ async def test_stop_works_on_every_page_and_in_every_dialog(lab):
         assert not called  # while typing it only leaves the line
         await op.press("ctrl+p")
         await op.until(lambda: len(op.app.screen_stack) == 2)
-        await stops(op, "f9")
+        await op.stop("f9")
 
 
 _HELD_UP = """\
@@ -79,22 +56,11 @@ async def test_stop_works_in_every_state_that_lasts(lab):
     lab.restart()
 
     async with lab.ready(countdown_s=600.0) as op:
-        for stage, key, said in (
-            (Stage.SETTLING, "f9", "nothing fell"), (Stage.COUNTDOWN, "escape", "nothing fell"),
-            (Stage.TESTING, "f9", "the release is off"),
-        ):  # fmt: skip
-            if stage is Stage.TESTING:
-                await op.press("l")
-                await op.open("Confirm")
-                await op.mean()
-            await op.arm(stage)
-            await stops(op, key)
-            await op.at(Stage.PREPARE)
-            await op.see(said)
+        await op.play("stop in every state that lasts")
         await op.until(lambda: op.app.follower.state.phase == "idle")
         op.app.driver.flow = replace(op.app.flow, countdown_s=0.1)
         await op.arm(Stage.LIVE)
-        await stops(op, "escape")
+        await op.stop("escape")
         await op.at(Stage.RESULT)  # what there is is kept and judged
     ((run, attempt),) = drops_of(lab.session)
     assert run == 1
