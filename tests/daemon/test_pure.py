@@ -214,6 +214,14 @@ def test_stop_is_sent_five_times_unless_the_worker_takes_over(monkeypatch, worke
     assert 0.0 < sum(paused) < HOST_SILENCE_MS * 1e-3
 
 
+@pytest.mark.parametrize(("url", "recorder"), [("a port", None), ("sim://", Mock())])
+def test_no_abort_goes_past_where_no_board_is_or_it_lives_in_the_workers_thread(url, recorder):
+    worker = Worker(url, PublishedState(), Lease())
+    worker.controller.recorder = recorder
+    assert not worker._abort_past()
+    assert recorder is None or not recorder.mock_calls
+
+
 def test_a_signal_waits_only_while_something_falls():
     """The daemon records what fell; to stop it then would cut the recording short."""
     answer, interrupts, client = Future(), Interrupts(), Client.__new__(Client)

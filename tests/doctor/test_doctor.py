@@ -257,17 +257,12 @@ def test_a_port_that_is_not_there_is_not_opened(doctor):
     assert "board: not possible here: its port cannot be used now\n" in done.out
 
 
-def test_programs_read_codes(doctor, tmp_path):
+@cases
+def test_programs_read_codes(finding, doctor, tmp_path):
     done = doctor("--json", "--session", tmp_path / "none", code=4)
-    missing = json.loads(done.out)["findings"][-1]
     assert done.err == "1 thing to do\n"
-    assert missing == {
-        "name": f"session {tmp_path / 'none'}",
-        "verdict": "failed",
-        "what": "not there",
-        "advice": "check its name; rig run makes a new one",
-        "reason_codes": [{"code": "session_missing", "values": {}}],
-    }
+    name = f"session {tmp_path / 'none'}"
+    assert json.loads(done.out)["findings"][-1] == {"name": name, **finding}
 
 
 def test_a_restart_in_a_drop_is_timed_and_found_again_in_the_session(doctor, tmp_path):
