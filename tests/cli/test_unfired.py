@@ -10,6 +10,7 @@ from rig.runner import Operator, run_protocol
 from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.cli.lab import assert_whole, drops_of, log_of, truth_of
+from tests.tables import cases
 
 ARMED, FIRED, INTERRUPTED = RunState.ARMED, RunState.FIRED, RunState.INTERRUPTED
 
@@ -25,8 +26,9 @@ def once_armed(monkeypatch):
             token = arm(recorder, *what)
             if next(number) <= times:
                 port = recorder._port
-                port.board.advance(port.clock.now_ns())
-                happen(port)
+                for deed, value in happen:
+                    port.board.advance(port.clock.now_ns())
+                    (port.clock.sleep if deed == "sleep" else getattr(port.board, deed))(value)
             return token
 
         monkeypatch.setattr(Recorder, "arm", armed)
@@ -34,28 +36,7 @@ def once_armed(monkeypatch):
     return have
 
 
-def flicker(port):
-    port.board.touch(1 << 1)
-    port.board.touch(0)
-
-
-def press_stop(port):
-    port.board.stop(True)
-    port.clock.sleep(1e-3)  # longer than any spike
-    port.board.advance(port.clock.now_ns())
-    port.board.stop(False)
-
-
-HAPPENINGS = [
-    (flicker, "gate 1 changed after arming"),
-    (lambda port: port.board.touch(1 << 1), "gate 1 is blocked"),
-    (press_stop, "the device disarmed itself: the emergency stop was opened"),
-    (lambda port: port.clock.sleep(0.3),
-     "the device disarmed itself: this program was silent for too long"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("happen", "why"), HAPPENINGS)
+@cases
 def test_a_drop_that_is_not_let_go_is_prepared_again(run, tmp_path, once_armed, happen, why):
     once_armed(happen, times=2)
     assert run().err.count(f"not fired: {why}") == 2
@@ -69,7 +50,7 @@ def test_a_drop_that_is_not_let_go_is_prepared_again(run, tmp_path, once_armed, 
     assert_whole(tmp_path / "s", 2)
 
 
-@pytest.mark.parametrize(("happen", "why"), [HAPPENINGS[0], HAPPENINGS[3]])
+@cases
 def test_a_device_that_never_lets_go_is_not_asked_for_ever(run, tmp_path, once_armed, happen, why):
     once_armed(happen, times=5)
     done = run(code=4)
