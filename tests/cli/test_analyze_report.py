@@ -31,24 +31,18 @@ def test_the_report_is_one_page_that_loads_nothing(page):
     assert not re.findall(r"https?://(?!www\.w3\.org/)[^\s<]*", html)
 
 
-def test_the_report_has_the_stamp_all_figures_and_every_run(page, finished):
+@cases
+def test_the_report_has_the_stamp_all_figures_and_every_run(texts, page, finished):
     html = page.read_text("utf-8")
     assert html.startswith("<!DOCTYPE html>")
-    assert "<title>SIMULATED – A short campaign</title>" in html
-    assert '<p class="stamp">SIMULATED DATA</p>' in html
+    assert [text for text in texts if text not in html] == []
     figures = re.findall(r'<svg class="slim".*?</svg>', html, re.DOTALL)
     assert len(figures) == 5  # the result, the fall twice, the budget, the runs
     assert all("SIMULATED" in figure for figure in figures)
     assert html.count('<figure class="drop"') == 4  # what the gates saw of each drop
-    assert "Separation against time" in html
-    assert "Runs in order" in html
-    assert "4 drops, 2 inclines, " in html
-    assert "No deviations: every planned run was recorded once" in html
     assert len(html) < 400_000
     with Session.open(finished.session, readonly=True) as session:
         assert session.meta["protocol_sha256"] in html
-    assert "virtual" in html
-    assert "restitution: 0.50 ± 0.05" in html
 
 
 def test_a_report_tells_no_paths_of_the_machine(page, finished):
