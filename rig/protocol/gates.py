@@ -14,7 +14,7 @@ CLEARANCE_M = 0.001
 
 
 def check_sides(section: Section, *, surface: bool, chains: int) -> None:
-    """Note sides that a scene does not have or that lack gates, and channels used twice.
+    """Note sides that a scene does not have or that lack gates, and gates of one channel or place.
 
     Parameters
     ----------
@@ -33,18 +33,23 @@ def check_sides(section: Section, *, surface: bool, chains: int) -> None:
         section.refuse("the only chain strikes the surface; put the gates under impact", "free")
     elif not surface or chains > 1:
         section.need("free")
-    lines: dict[int, int] = {}
-    for gate in _sections(section):
-        channel = gate["channel"]
-        if channel in lines:
-            gate.fault("channel", f"channel {channel} is already used on line {lines[channel]}")
-        elif channel is not None:
-            lines[channel] = gate.place("channel").line
+    lines: dict[object, int] = {}
+    for side, gate in _sections(section):
+        channel, height = gate["channel"], gate["height"]
+        gate_values = {
+            "channel": (channel, f"channel {channel} is already used"),
+            "height": (height and (side, height), "a gate of this side is already there,"),
+        }
+        for key, (value, message) in gate_values.items():
+            if value in lines:
+                gate.fault(key, f"{message} on line {lines[value]}")
+            elif value is not None:
+                lines[value] = gate.place(key).line
 
 
-def _sections(section: Section) -> Iterator[Section]:
-    """Return the gates of all sides that are mappings, in the order of the file's keys."""
-    return (gate for side in SIDES for gate in section[side] or () if gate)
+def _sections(section: Section) -> Iterator[tuple[str, Section]]:
+    """Return the side and the mapping of each gate, in the order of the file's keys."""
+    return ((side, gate) for side in SIDES for gate in section[side] or () if gate)
 
 
 class HangingRod(NamedTuple):
@@ -92,7 +97,7 @@ def check_clear(top: Section, chains: Collection[RodChain], inclines: Iterable[f
     top_rod = min(drop.value + chain.chain.length for chain in chains)
     part = vocabulary_of(chains, struck=struck).part
     only = next(iter(chains)).name if all(chain.chain.rods == 1 for chain in chains) else None
-    for gate in filter(Section.is_sound, _sections(top["gates"])):
+    for gate in (gate for _, gate in _sections(top["gates"]) if gate.is_sound()):
         height = gate["height"]
         rod = blocking_rod(rods, height)
         if height < lowest:
