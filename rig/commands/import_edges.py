@@ -83,16 +83,15 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
     """Compare the first drops with falls that the protocol has."""
     planned = {run.number: run for run in runs(protocol)}
     # Of gates that the file does not have nothing is due.
-    protocol = with_channels(protocol, {*reading.channel.tolist()})
+    protocol = with_channels(protocol, {*reading.edges.channel.tolist()})
     near, expected, evidence = 0, 0, 0.0
     shares, results = [(1.0, 0)], list[DropResult]()
     rate = TimeScale(TICK_HZ, RESONATOR_TOLERANCE)
     most = None if exact else _COMPARED
-    compared = [n for n, run in enumerate(reading.runs) if run in planned][:most]
-    parts, lasting = reading.parts, reading.lasting
-    order = sorted(compared, key=lambda n: (parts[n].stop - parts[n].start, lasting[n]))
+    compared = [n for n in reading.runs if n in planned][:most]
+    order = sorted(compared, key=lambda n: (len(reading.runs[n]), reading.lasting[n]))
     for n in sorted({*order[:: 1 + len(order) // _MOST], *order[-1:]}):
-        run, drop = planned[reading.runs[n]], reading.drop(n)
+        run, drop = planned[n], reading.drop(n)
         records = chain_records(protocol.of(run), run, drop, TICK_HZ)
         matched = sum(side_fall(protocol.of(run), x, rate.u).most_matches() for x in records)
         due = sum(record.edge_count for record in records)

@@ -11,14 +11,14 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 from rig.text_rows import read_rows
 from rig.timers import vocabulary
 from rig.timers.table import Row, RowBlock
 from rig.timers.timer_file import TimerFile
-from rig.timers.vocabulary import POWERS, find_label, form, is_measured, is_number, unit_of, words
+from rig.timers.vocabulary import POWERS, find_label, form, holds, is_measured, is_number, unit_of
 
 SAMPLED = ("level", "volts")
 """Roles of samples: what an input was at a time, whether it changed then or not."""
@@ -121,7 +121,7 @@ def columns_of(
         file.problems.refuse(rows[0].line, "too_many_columns", columns=width, limit=_WIDEST)
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
     facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
-    held = Counter(itertools.chain(*facts.values()))
+    counts = Counter(itertools.chain(*facts.values()))
     heading = block.find_heading(width, facts)
     numbers = [n for n, text in enumerate(rows[0].texts) if is_measured(text)]
     for row in block.headings:
@@ -136,9 +136,9 @@ def columns_of(
     is_counted = facts.keys() >= {0, width - 1} and "counts" in facts[0]
     if heading and is_counted and len(heading.texts) < width:
         heading = heading._replace(texts=["", *heading.texts])  # numbers of rows have no name
-    file.facts |= {"beam"} & {fact.removeprefix("any.") for fact in held}
-    shared = {f"table.{fact}" for fact in held} | _held({"rated": block.find_time_base()[1]})
-    shared |= {f"columns.{min(len(facts), _MANY)}", f"states.{min(held['all.state'], _MANY)}"}
+    file.facts |= {*["beam"] * bool(counts["any.beam"])}
+    shared = {f"table.{fact}" for fact in counts} | _held({"rated": block.find_time_base()[1]})
+    shared |= {f"columns.{min(len(facts), _MANY)}", f"states.{min(counts['all.state'], _MANY)}"}
     columns = [_read_column(block, heading, n, facts[n] | shared, cells[n]) for n in facts]
     for column in columns:
         column.filled = len(cells[column.at]) / len(rows)
@@ -205,7 +205,7 @@ def _read_column(
     roles_of_name = vocabulary.roles_in(bare)
     named = {
         "time": unit in POWERS
-        and vocabulary.normal(name).strip("()[] ") in words()[f"unit {unit}"],
+        and vocabulary.normal(name).strip("()[] ") in vocabulary.words()[f"unit {unit}"],
         "bare": not (roles_of_name - _NO_ROLES or unit or column.gate or column.run),
         "named": name,
         "first": not n,
@@ -215,9 +215,7 @@ def _read_column(
     kind = "timed" if unit in POWERS else {"v": "volt", "": "unitless"}.get(unit, "strange")
     facts |= roles_of_name | _held(named) | {kind}
     column.role = next(
-        role
-        for role, rule in read_rows(__file__, "columns.txt", ":")
-        if all((fact.lstrip("-") in facts) is (fact[0] != "-") for fact in rule.split())
+        role for role, rule in read_rows(__file__, "columns.txt", ":") if holds(rule, facts)
     )
     if column.role in {"time", "elapsed"}:
         column.power = POWERS.get(unit, 0 if "all.stamp" in facts else None)
@@ -253,7 +251,7 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
 
 
 def _held(facts: Mapping[str, object]) -> set[str]:
-    return {fact for fact, holds in facts.items() if holds}
+    return {fact for fact, is_true in facts.items() if is_true}
 
 
 def pair_columns(columns: Sequence[TimerColumn]) -> Iterator[Signal]:
@@ -265,7 +263,7 @@ def pair_columns(columns: Sequence[TimerColumn]) -> Iterator[Signal]:
     times = [c for c in times if c.power == finest[_part_of(c)]] or counts
     chosen = next((v for v in VALUES if any(c.role in v for c in columns)), ())
     is_sampled = chosen == SAMPLED
-    clocks = {c: _clock_of(c, times) for c in columns if c.role in chosen}
+    clocks = {c: min(times, key=partial(_distance, c)) for c in columns if c.role in chosen}
     for clock in times:
         values = [column for column in clocks if clocks[column] is clock]
         # Without values it shares those of another run, or tells of changes by itself.
@@ -284,15 +282,11 @@ def _part_of(clock: TimerColumn) -> tuple[str, str, str]:
     return clock.gate, clock.run, clock.state
 
 
-def _clock_of(value: TimerColumn, times: Sequence[TimerColumn]) -> TimerColumn:
-    """Return the times of a value: of its run and gate, else those nearest to its left."""
-
-    def strangeness(clock: TimerColumn) -> tuple[bool, bool, bool, int]:
-        is_other_run = bool(value.run) and clock.run not in {value.run, ""}
-        is_other_gate = not clock.gate or clock.gate != value.gate
-        return is_other_run, is_other_gate, clock.at > value.at, abs(clock.at - value.at)
-
-    return min(times, key=strangeness)
+def _distance(value: TimerColumn, clock: TimerColumn) -> tuple[bool, bool, bool, int]:
+    """Return how far times are from a value: in run and gate, else by columns, nearest if left."""
+    is_other_run = bool(value.run) and clock.run not in {value.run, ""}
+    is_other_gate = not clock.gate or clock.gate != value.gate
+    return is_other_run, is_other_gate, clock.at > value.at, abs(clock.at - value.at)
 
 
 def _label_of(value: TimerColumn) -> str:

@@ -19,7 +19,7 @@ from rig.errors import InputError
 from rig.reasons import Reason, make_reason
 from rig.records import Drop
 from rig.timers.edge_rows import HEADER, is_own, read_edges
-from rig.timers.layouts import SETTINGS, FileReading, find_layouts, input_names
+from rig.timers.layouts import SETTINGS, FileReading, find_layouts, input_names, is_accepted
 from rig.timers.lines import read_lines
 from rig.timers.moments import LONGEST_DROP, TICK_HZ
 from rig.timers.problems import refusal
@@ -48,7 +48,7 @@ class FallMatch(NamedTuple):
     share
         Edges near a fall's, of all that came or were due, from 0 to 1, in the worst run.
     worst
-        Which of the runs that is, from 0.
+        Which run that is; 0 if none was compared.
     evidence
         Logarithm of the marginal likelihood; 0 if not asked for.
     text
@@ -125,8 +125,7 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
     channels = reading.layout.channels
     pairs = [f"input {x} is the gate at channel {n}" for x, n in channels.items() if x]
     lines = [*reading.file.lines, *pairs, str(reading.layout), *filter(None, [match.text])]
-    drops = [*map(reading.drop, range(len(reading.runs)))]
-    return Import(drops, channels, lines, notes)
+    return Import([*map(reading.drop, reading.runs)], channels, lines, notes)
 
 
 def _find_readings(options: Namespace, gates: Sequence[int], bars: int) -> list[FileReading]:
@@ -150,12 +149,12 @@ def _find_readings(options: Namespace, gates: Sequence[int], bars: int) -> list[
         pairs = ",".join(f"{name}={n}" for name, n in zip(labels, gates, strict=False))
         values = {"inputs": ", ".join(labels), "channels": ", ".join(map(str, gates))}
         raise refusal(options.events, "inputs_unclear", **values, pairs=pairs)
-    shortest = min(readings, key=lambda reading: max(reading.lasting))
-    if max(shortest.lasting) > LONGEST_DROP:
-        place = f"{options.events}:{shortest.line[shortest.tick.argmax()]}:1"
-        limit = {"lasting_s": max(shortest.lasting) / TICK_HZ, "limit_s": LONGEST_DROP / TICK_HZ}
+    shortest = min(readings, key=lambda reading: max(reading.lasting.values()))
+    if (lasting := max(shortest.lasting.values())) > LONGEST_DROP:
+        place = f"{options.events}:{shortest.edges.line[shortest.edges.tick.argmax()]}:1"
+        limit = {"lasting_s": lasting / TICK_HZ, "limit_s": LONGEST_DROP / TICK_HZ}
         raise refusal(place, "too_long", **limit)
-    return [reading for reading in readings if max(reading.lasting) <= LONGEST_DROP]
+    return [reading for reading in readings if max(reading.lasting.values()) <= LONGEST_DROP]
 
 
 def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[FileReading, FallMatch]:
@@ -169,25 +168,24 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
     usual = [reading for reading in distinct if reading.is_whole] or distinct
     if len(usual) == 1 and "channels" in usual[0].file.stated:
         return usual[0], fit(usual[0], True)
-    rough = sorted(((fit(x, False), x) for x in distinct), key=lambda row: -row[0].share)
-    likely = [x for match, x in rough if match.share >= x.least_share]
-    exact = [(fit(x, True), x) for x in likely[:_FINALISTS]]
-    ranked = [row for row in exact if row[0].evidence and row[0].share >= row[1].least_share]
-    ranked.sort(key=lambda row: _DECISIVE * row[1].oddities - row[0].evidence)
+    matches = {x: fit(x, False) for x in distinct}
+    rough = sorted(distinct, key=lambda x: -matches[x].share)
+    likely = [x for x in rough if matches[x].share >= x.least_share]
+    finalists = likely[:_FINALISTS]
+    matches |= {x: fit(x, True) for x in finalists}
+    ranked = [x for x in finalists if matches[x].evidence and matches[x].share >= x.least_share]
+    ranked.sort(key=lambda x: _DECISIVE * x.oddities - matches[x].evidence)
     if not ranked:
-        match, best = (exact or rough)[0]
-        is_open = [x for _, x in rough if x.layout.dark not in {"states", "inverted"}]
+        best = (finalists or rough)[0]
+        is_open = [x for x in rough if x.layout.dark not in {"states", "inverted"}]
         proposed = list(dict.fromkeys(str(x.layout) for x in [*likely, *is_open]))[:3]
-        options = "; ".join([*proposed, "--as-read"])
-        values = {"share": 100 * match.share, "run": best.runs[match.worst], "options": options}
-        line = best.line[best.parts[match.worst]].min()
-        raise refusal(f"{place}:{line}:1", "no_reading_fits", **values)
-    (match, reading), *rest = ranked
-    rivals = [x for x in rest if x[1].oddities == reading.oddities]
-    if rivals and match.evidence - rivals[0][0].evidence < _DECISIVE:
-        options = f"{reading.layout} or {rivals[0][1].layout}"
-        raise refusal(place, "several_readings", options=options)
-    return reading, match
+        run, options = matches[best].worst or min(best.runs), "; ".join([*proposed, "--as-read"])
+        values = {"share": 100 * matches[best].share, "run": run, "options": options}
+        raise refusal(f"{place}:{best.runs[run].line.min()}:1", "no_reading_fits", **values)
+    best, rival = ranked[0], next((x for x in ranked[1:] if x.oddities == ranked[0].oddities), None)
+    if rival and matches[best].evidence - matches[rival].evidence < _DECISIVE:
+        raise refusal(place, "several_readings", options=f"{best.layout} or {rival.layout}")
+    return best, matches[best]
 
 
 def _refuse_impossible(reading: FileReading, place: str) -> None:
@@ -200,30 +198,31 @@ def _refuse_impossible(reading: FileReading, place: str) -> None:
     if is_wire and "groups" not in file.stated:
         raise refusal(place, "one_wire", option=str(layout))
     earlier: dict[object, int] = {}
-    for n, part in enumerate(reading.parts):
-        drop, lines = reading.drop(n), tuple(reading.line[part].tolist())
+    for run, edges in reading.runs.items():
+        drop, lines = reading.drop(run), tuple(edges.line.tolist())
         # Of coarse times those of a whole drop are a copy's; of fine ones, rows may be missing.
         is_coarse = all(edge.tick % _COARSE == 0 for edge in drop.edges)
         moments: set[object] = {drop.edges} if is_coarse else {*drop.edges}
         if layout.pause_s and lines in earlier:  # a column of another clock
             moments = {lines}
         same = Counter(earlier[moment] for moment in moments & earlier.keys())
-        earlier |= dict.fromkeys((lines, *moments), drop.run)
-        for run, count in same.most_common(1):
+        earlier |= dict.fromkeys((lines, *moments), run)
+        for other, count in same.most_common(1):
             if count >= min(len(moments), max(_FEWEST_SAME, 1 + len(moments) // 2)):
-                raise refusal(place, "same_twice", run=drop.run, other=run)
+                raise refusal(place, "same_twice", run=run, other=other)
     # Of changes alone, two in a row mean that the row of the first is missing.
-    is_again = (np.diff(reading.line) == 0) & (np.diff(reading.tick) == 0)
-    if np.any(is_again) and file.period is None:  # regular samples see changes together
-        raise refusal(place, "at_once", lines=_some(reading.line[1:][is_again].tolist()))
+    line, tick = reading.edges.line, reading.edges.tick
+    again = line[1:][(np.diff(line) == 0) & (np.diff(tick) == 0)]
+    if again.size and file.period is None:  # regular samples see changes together
+        raise refusal(place, "at_once", lines=_some(again.tolist()))
 
 
 def _account(reading: FileReading, options: Namespace) -> Reason:
     """Say what became of every row; refuse rows that are not used."""
-    file, edges = reading.file, Counter(reading.line.tolist())
+    file, edges = reading.file, Counter(reading.edges.line.tolist())
     # A level that changes may be of an input that is no gate.
-    is_change = ~file.changes["first"] & ("sampled" not in file.facts)
-    left = Counter(file.changes["line"][is_change].tolist()) - edges
+    is_change = ~file.changes.first & ("sampled" not in file.facts)
+    left = Counter(file.changes.line[is_change].tolist()) - edges
     unused = sorted({*file.unread, *left})
     counts = {"runs": len(reading.runs), "rows": file.rows, "edges": edges.total()}
     if not unused:
@@ -241,7 +240,7 @@ def _some(lines: Sequence[int]) -> str:
 def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]:
     """Yield what is taken to be so, and what the file lacks."""
     file, layout, channels = reading.file, reading.layout, reading.layout.channels
-    if reading.renamed and file.changes["run"].any():
+    if reading.renamed and file.changes.run.any():
         runs = ", ".join(f"{name} is run {n}" for name, n in reading.renamed.items())
         yield make_reason("runs_renamed", runs=runs)
     if layout.pause_s:
@@ -278,21 +277,21 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
         for name, begin in begins.items()
         if (value := getattr(options, name)) is not None
     }
-    settings = {*SETTINGS}.difference(labels)
     pairs = form("assigned").findall
     rows = [(x, *y) for x, text in texts.items() for y in pairs(text) or [(text, "")]]
+    settings = {*SETTINGS}.difference(labels)
     stated: dict[str, Any] = {name: value for _, name, value in rows if name in settings}
     inputs = {x or "input": x for x in input_names(file, stated.get("groups"), gates)}
+    accepted = f"INPUT=CHANNEL with a gate's channel: {', '.join(map(str, gates))}"
     channels = dict[str, int]()
     for place, name, value in rows:
-        if name in inputs and value in map(str, gates):
+        if name in inputs:
+            if value not in map(str, gates):
+                raise refusal(place, "not_accepted", text=f"{name}={value}", accepted=accepted)
             channels[inputs[name]] = int(value)
-        elif name in inputs:
-            accepted = f"INPUT=CHANNEL with a gate's channel: {', '.join(map(str, gates))}"
-            raise refusal(place, "not_accepted", text=f"{name}={value}", accepted=accepted)
         elif name not in settings:
             raise refusal(place, "input_unknown", text=name, inputs=", ".join(inputs))
-        elif not form(f"setting {name}").fullmatch(value):
+        elif not is_accepted(name, value):
             raise refusal(place, "layout_unclear", text=f"{name}={value:.40}")
         elif name == "unit" and {None, POWERS[value]}.isdisjoint(file.powers):
             units = " and ".join(sorted(SYMBOLS[power] for power in file.powers)) or "s"

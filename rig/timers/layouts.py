@@ -1,12 +1,13 @@
 """Ways in which a file may be read: all of them, and the drops as each gives them.
 
 A layout says what a file leaves open: the unit, which level is dark, whether parts are runs or
-gates, and which gate each input is.
+gates, and which gate each input is. What each setting may be, and when, is in `layouts.txt`.
 """
 
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
@@ -14,12 +15,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rig.arrays import Index
+from rig.arrays import Flags, Index
 from rig.records import Drop
+from rig.text_rows import read_rows
 from rig.timers.edge_rows import make_drop
 from rig.timers.moments import TICK_HZ
-from rig.timers.timer_file import STATES, Changes, TimerFile
-from rig.timers.vocabulary import POWERS, number_of
+from rig.timers.timer_file import STATES, Records, TimerFile
+from rig.timers.vocabulary import POWERS, holds, number_of
 
 _LONGEST = 60 * TICK_HZ
 """Picoseconds: a drop lasts half a second, and nobody waits a minute until it is recorded."""
@@ -31,6 +33,9 @@ _GOOD_GUESS = 0.95
 _MOST_MAPS = 200
 _FEWEST = 3
 """Changes of a drop that tell which gate it passed: two are near those of falls past several."""
+_EDGE = np.dtype(
+    [("run", "i8"), ("tick", "O"), ("channel", "i8"), ("blocked", "?"), ("line", "i4")]
+)
 
 
 class FileLayout(NamedTuple):
@@ -76,7 +81,7 @@ class FileLayout(NamedTuple):
 
 
 SETTINGS = FileLayout._fields[:-1]
-"""What a layout has beside its inputs; `forms.txt` says what each may be."""
+"""What a layout has beside its inputs; `layouts.txt` says what each may be."""
 
 
 class FileReading:
@@ -84,15 +89,13 @@ class FileReading:
 
     Attributes
     ----------
-    runs
-        Their numbers, in order.
-    parts
-        The edges of each run.
+    edges
+        All of them, by runs: of each its run, its time, ps, its gate, the state after it, and the
+        line that it comes from.
+    runs, lasting
+        Those of each run, by its number, and how long they last, ps.
     firsts
         Inputs whose first row is a beam that is blocked, at the beginning or by a change.
-    run, line, tick, channel, blocked
-        Of each edge: its run, the line that it comes from, its time, ps, its gate, and the state
-        after it.
     renamed
         Runs that the file calls otherwise: its name, and the number here.
     """
@@ -100,58 +103,47 @@ class FileReading:
     def __init__(self, file: TimerFile, layout: FileLayout) -> None:
         self.file, self.layout = file, layout
         changes, drop = group_changes(file, layout.unit, layout.groups, layout.pause_s)
-        label, names = changes["label"], [*file.names]
+        label, names = changes.label, [*file.names]
         channels = [layout.channels.get(name, -1) for name in names]
+        begin = np.searchsorted(drop, drop)
         if layout.groups == "passing":  # of gates that are passed one by one, each has as many
             channels = [*layout.channels.values()]
             share = np.maximum(1, np.bincount(drop)[drop] // len(channels))
-            label = np.minimum(count_before(drop) // share, len(channels) - 1)
-        channel, state = np.array(channels)[label], changes["state"]
-        is_first = count_before(drop * (1 + len(channels)) + label) % 2 == 0
+            label = np.minimum((np.arange(len(drop)) - begin) // share, len(channels) - 1)
+        channel, state = np.array(channels)[label], changes.state
+        is_turn = count_before(drop * (1 + len(channels)) + label) % 2 == 0
         blocked = np.where(
             state > 0,
             (state % 2 == 0) ^ (layout.dark in {"inverted", "low"}),
-            is_first ^ (layout.dark == "turns-clear") | (layout.dark == "each"),
+            is_turn ^ (layout.dark == "turns-clear") | (layout.dark == "each"),
         )
         # A beam is clear at the beginning; a first row that says so changes nothing.
-        _, starts = np.unique(drop, return_index=True)
-        is_late = changes["tick"] > changes["tick"][starts][drop]
-        is_odd = changes["first"] & blocked & (channel >= 0) & ~is_late
-        self.firsts = [names[n] for n in np.unique(changes["label"][is_odd])]
-        is_change = ~changes["first"] | (blocked & (is_late | (layout.first == "change")))
-        is_edge = is_change & (channel >= 0)
-        edges, channel, blocked = changes[is_edge], channel[is_edge], blocked[is_edge]
-        _, first, places = np.unique(drop[is_edge], return_index=True, return_inverse=True)
-        called = [names[n] for n in edges["run"][first]]
-        numbers = list(map(number_of, called))
-        runs = np.array([-1 if n is None else n for n in numbers], dtype=int)
-        runs += np.any(runs == 0)  # a file may count its runs from 0
-        runs[(runs < 0) | (count_before(runs) > 0)] = 0
-        free = np.setdiff1d(np.arange(1, 1 + 2 * len(runs)), runs)
-        runs[runs == 0] = free[: np.sum(runs == 0)]
-        rows = zip(called, numbers, runs.tolist(), strict=True)
-        self.renamed = {x or "one without a name": run for x, n, run in rows if run != n}
-        order = np.argsort(runs[places], kind="stable")
-        self.run, self.channel, self.blocked = runs[places][order], channel[order], blocked[order]
-        self.line, self.tick = edges["line"][order], edges["tick"][order]
-        runs, places = np.unique(self.run, return_index=True)
-        self.runs, self.parts = runs.tolist(), [*map(slice, places, [*places[1:], len(order)])]
+        is_late, is_gate = changes.tick > changes.tick[begin], channel >= 0
+        is_dark_first = changes.first & blocked & is_gate & ~is_late
+        self.firsts = [names[n] for n in np.unique(changes.label[is_dark_first])]
+        is_edge = is_gate & (~changes.first | (blocked & (is_late | (layout.first == "change"))))
+        columns = [drop, changes.tick, channel, blocked, changes.line]
+        edges = np.rec.fromarrays(columns, _EDGE)[is_edge]
+        _, begin, places = np.unique(edges.run, return_index=True, return_inverse=True)
+        called = [names[n] for n in changes.run[is_edge][begin]]
+        numbers = _number_runs([*map(number_of, called)])
+        rows = zip(called, numbers, strict=True)
+        self.renamed = {x or "one without a name": n for x, n in rows if number_of(x) != n}
+        edges.run = np.array(numbers, int)[places]
+        self.edges: Records = edges[np.argsort(edges.run, kind="stable")]
+        numbers.sort()
+        parts = np.split(self.edges, np.searchsorted(self.edges.run, numbers)[1:])
+        self.runs: dict[int, Records] = dict(zip(numbers, parts, strict=False))
+        self.lasting = {run: part.tick[-1] - part.tick[0] for run, part in self.runs.items()}
 
-    def drop(self, n: int) -> Drop:
-        """Return the n-th drop."""
-        columns = (x[self.parts[n]].tolist() for x in (self.tick, self.channel, self.blocked))
-        return make_drop(self.runs[n], zip(*columns, strict=True))
-
-    @property
-    def lasting(self) -> list[int]:
-        """How long each drop lasts, ps."""
-        return [self.tick[part][-1] - self.tick[part][0] for part in self.parts]
+    def drop(self, run: int) -> Drop:
+        """Return the drop of a run."""
+        return make_drop(run, self.runs[run][["tick", "channel", "blocked"]].tolist())
 
     @property
     def key(self) -> int:
         """What is the same for readings of the same edges."""
-        columns = self.run, self.tick, self.channel, self.blocked
-        return hash(tuple(tuple(column.tolist()) for column in columns))
+        return hash((*self.edges[["run", "tick", "channel", "blocked"]].tolist(),))
 
     @property
     def least_share(self) -> float:
@@ -163,8 +155,8 @@ class FileReading:
     @property
     def oddities(self) -> int:
         """Count what is contrary to what the file says, or to how files and beams usually are."""
-        # Of the layout: which level is dark, groups, and the first row.
-        return len({"inverted", "unsorted", "change"} & {*self.layout[1:4]}) + (not self.is_whole)
+        odd = [x for x in read_rows(__file__) if x[3:] and getattr(self.layout, x[0]) == x[1]]
+        return len(odd) + (not self.is_whole)
 
     @property
     def is_whole(self) -> bool:
@@ -172,45 +164,61 @@ class FileReading:
 
         Where the file says when they are blocked, it is not doubted.
         """
-        beams = self.run * 100 + self.channel
+        beams = self.edges.run * 100 + self.edges.channel
         _, first, counts = np.unique(beams, return_index=True, return_counts=True)
         if self.layout.dark.startswith("turns"):
             return not np.any(counts % 2)
-        return self.layout.dark not in {"high", "low"} or bool(np.any(self.blocked[first]))
+        return self.layout.dark not in {"high", "low"} or bool(np.any(self.edges.blocked[first]))
+
+
+def _number_runs(numbers: Sequence[int | None]) -> list[int]:
+    """Number runs from 1, as the file does where it does so, and the others by free numbers."""
+    shift = 0 in numbers  # a file may count its runs from 0
+    first = {number: n for n, number in reversed([*enumerate(numbers)])}
+    free = (n for n in itertools.count(1) if n - shift not in first)
+    return [
+        next(free) if number is None or number + shift < 1 or first[number] < n else number + shift
+        for n, number in enumerate(numbers)
+    ]
 
 
 @lru_cache(4)
-def group_changes(file: TimerFile, unit: str, groups: str, pause: float) -> tuple[Changes, Index]:
+def group_changes(file: TimerFile, unit: str, groups: str, pause: float) -> tuple[Records, Index]:
     """Return changes by drops and times, and which drop each is of.
 
     In a file that says the drops, they are parted by no time; in others where times begin anew.
     """
-    changes, tick = file.changes, file.changes["tick"]
+    changes, tick = file.changes, file.changes.tick
     part = changes[{"rows": "line", "columns": "clock"}.get(groups, "run")]
-    keys = np.stack([changes["block"] * ("run" not in file.facts), changes["run"], part])
-    order = np.lexsort((tick, changes["line"], *keys[::-1]))
-    is_new = np.any(np.diff(keys[:, order], prepend=-1) != 0, axis=0)
-    if file.is_stacked and groups in {"runs", "passing"}:
+    keys = np.stack([changes.block * ("run" not in file.facts), changes.run, part])
+    order = np.lexsort((tick, changes.line, *keys[::-1]))
+    is_new = _differs(*keys[:, order])
+    if groups in {"runs", "passing"} and file.facts.isdisjoint({"sampled", "run"}):
+        # Runs may stand one below the other.
         is_new |= np.diff(tick[order], prepend=0) < 0
-    drop = np.cumsum(is_new)
+    drop = np.cumsum(is_new) - 1
     order = order[np.lexsort((tick[order], drop))]
     # Nothing does the same twice at once.
-    same = np.stack([drop, *(changes[name][order] for name in ("tick", "label", "state"))])
-    is_other = np.any(np.diff(same, prepend=-1) != 0, axis=0)
-    changes, drops = changes[order][is_other], drop[is_other].astype(np.intp) - 1
-    changes["tick"] //= 10 ** POWERS[unit or "s"]
+    is_other = _differs(drop, *(changes[name][order] for name in ("tick", "label", "state")))
+    changes, drops = changes[order][is_other], drop[is_other]
+    changes.tick //= 10 ** POWERS[unit or "s"]
     if pause:
-        is_late = np.diff(changes["tick"], prepend=0) >= round(pause * TICK_HZ)
-        drops += np.cumsum(is_late & (np.diff(drops, prepend=-1) == 0))
+        is_late = np.diff(changes.tick, prepend=0) >= round(pause * TICK_HZ)
+        drops += np.cumsum(is_late & ~_differs(drops))
     return changes, drops
+
+
+def _differs(*columns: Index) -> Flags:
+    """Return which rows differ from the one above."""
+    differs: Flags = np.any([np.diff(x, prepend=-1) != 0 for x in columns], axis=0)
+    return differs
 
 
 def count_before(keys: Index) -> Index:
     """Return for each key how many equal ones are before it."""
     order = np.argsort(keys, kind="stable")
-    _, starts, counts = np.unique(keys[order], return_index=True, return_counts=True)
     before = np.empty_like(order)
-    before[order] = np.arange(len(order)) - np.repeat(starts, counts)
+    before[order] = np.arange(len(order)) - np.searchsorted(keys[order], keys[order])
     return before
 
 
@@ -218,6 +226,11 @@ def input_names(file: TimerFile, groups: str | None, gates: Sequence[int]) -> li
     """Name the inputs of a file whose parts are grouped so; an empty text where it names none."""
     passing = [f"gate {n}" for n in range(1, len(gates) + 1)]
     return passing if groups == "passing" else [*file.labels] or [""]
+
+
+def is_accepted(name: str, value: str) -> bool:
+    """Whether a setting may have a value."""
+    return any(name == x and re.fullmatch(form, value) for x, form, *_ in read_rows(__file__))
 
 
 def find_layouts(file: TimerFile, gates: Sequence[int], bars: int) -> Iterator[FileLayout]:
@@ -228,21 +241,17 @@ def find_layouts(file: TimerFile, gates: Sequence[int], bars: int) -> Iterator[F
     gates
         Channels, in the order in which the gates are passed.
     """
-    stated = file.stated
-    state, is_wire = file.changes["state"], len(file.labels) < 2 and bars == 1 < len(gates)
-    groups = ["runs", *["unsorted"] * file.is_stacked, *["columns"] * ("wide" in file.facts)]
-    groups += ["passing"] * is_wire
+    stated, state = file.stated, file.changes.state
     changes, drop = group_changes(file, "", "runs", 0.0)
-    most = 1 + count_before(drop * len(file.names) + changes["label"]).max(initial=0)
-    is_signal = np.any(state > STATES.index("blocked"))
-    states = ["states"] if "beam" in file.facts else ["states", "inverted"]
-    levels = ["high", "low"] if is_signal else states
-    # More times than bars: it darkens and clears in turns.
-    times = ["turns", "turns-clear", "each"] if most > bars else ["each", "turns", "turns-clear"]
-    choices: dict[str, Sequence[Any]] = {"unit": list(POWERS)} if None in file.powers else {}
-    choices["dark"] = levels if np.any(state) else times
-    choices["groups"] = groups
-    choices["first"] = ["state", "change"] if np.any(file.changes["first"]) else ["state"]
+    most = int(1 + count_before(drop * len(file.names) + changes.label).max(initial=0))
+    is_signal, is_wire = np.any(state > STATES.index("blocked")), len(file.labels) < 2
+    facts = {"signal" if is_signal else "states" if np.any(state) else "times", *file.facts}
+    facts |= {*["many"] * (most > bars), *["wire"] * (is_wire and bars == 1 < len(gates))}
+    facts |= {*["open"] * (None in file.powers), *["first"] * bool(np.any(file.changes.first))}
+    choices = dict[str, list[Any]]()
+    for name, value, rule, *_ in read_rows(__file__):
+        if holds(rule, facts):
+            choices.setdefault(name, []).append(value)
     choices |= {name: [value] for name, value in stated.items() if name in choices}
     for values in itertools.product(*choices.values()):
         layout = FileLayout(**dict(zip(choices, values, strict=True)))
@@ -262,7 +271,7 @@ def _pauses(file: TimerFile, unit: str, groups: str) -> list[float]:
     """
     changes, drop = group_changes(file, unit, groups, 0.0)
     is_same = (np.diff(drop) == 0) & ("run" not in file.facts)
-    pauses = np.sort(np.diff(changes["tick"])[is_same])
+    pauses = np.sort(np.diff(changes.tick)[is_same])
     is_clear = pauses[1:] >= np.maximum(_CLEAR_PAUSE * pauses[:-1], TICK_HZ / 2)
     choices = [0.0, *(pauses[1:][is_clear] / TICK_HZ).tolist()[:1]]
     is_long = not np.any(drop) and sum(pauses) > _LONGEST
@@ -278,18 +287,17 @@ def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list
     if layout.groups == "passing":
         return [dict(zip(labels, gates, strict=True))]
     by_number = {x: n for x in labels if (n := number_of(x)) is not None and n in gates}
-    if len(set(by_number.values())) == len(labels):
+    if len({*by_number.values()}) == len(labels):
         return [by_number]
     _, drop = group_changes(file, layout.unit, layout.groups, 0.0)
     if labels == [""] and len(gates) > 1 and np.all(np.bincount(drop) < _FEWEST):
         return []
-    later = file.changes[~file.changes["first"]][::-1]
-    first = dict(zip(later["label"].tolist(), later["tick"], strict=True))
+    later = file.changes[~file.changes.first][::-1]
+    first = dict(zip(later.label.tolist(), later.tick, strict=True))
     passed = sorted(labels, key=lambda label: first.get(file.names[label], 0))
-    chosen = itertools.islice(itertools.combinations(gates, len(labels)), _MOST_MAPS)
     maps = [
         dict(zip(names, channels, strict=True))
-        for beams in chosen
+        for beams in itertools.islice(itertools.combinations(gates, len(labels)), _MOST_MAPS)
         for names, channels in ((labels, sorted(beams)), (passed, beams))
     ]
     return maps or [by_number] * bool(by_number)

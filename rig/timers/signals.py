@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import re
 from array import array
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import closing
 from functools import lru_cache
 from typing import Any
@@ -23,7 +23,7 @@ from rig.timers.crossings import find_crossings
 from rig.timers.lines import is_cut, read_lines
 from rig.timers.moments import OVERFLOWS_PS, TICK_HZ, moment
 from rig.timers.table import Row, RowBlock, Table
-from rig.timers.timer_file import CHANGE, STATES, Changes, TimerFile
+from rig.timers.timer_file import CHANGE, STATES, Records, TimerFile
 from rig.timers.vcd import BEGINNINGS, vcd_rows
 from rig.timers.vocabulary import is_number, state_of
 
@@ -36,8 +36,6 @@ _SPARSE = 0.5
 """Share of cells with a text below which the others belong to the one above."""
 _TURN = 600 * TICK_HZ
 """Picoseconds from a time to the next within which a counter is taken to have begun anew."""
-_REJECTED = len(STATES)
-"""What a cell says that is not accepted; one that says nothing is 0."""
 
 
 def read_file(file: TimerFile) -> TimerFile:
@@ -48,23 +46,22 @@ def read_file(file: TimerFile) -> TimerFile:
     InputError
         Every fault of the file at its line and column, or what it is instead.
     """
+    readers, changes = dict[object, SignalReader](), [np.empty(0, CHANGE)]
     with closing(read_lines(file.path)) as lines:
         head = list(itertools.islice(lines, 50))
-        numbered = enumerate(itertools.chain(head, lines), 1)
-        is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
-        table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered)
+        numbered: Iterator[tuple[int, str]] = enumerate(itertools.chain(head, lines), 1)
+        if "".join(head).lstrip().startswith(BEGINNINGS):
+            numbered = vcd_rows(numbered, file.problems)
+        table = Table(numbered)
         file.lines += [f"a table, its cells separated by {_MARKS[table.separator]}"]
-        readers: dict[object, SignalReader] = {}
-        changes = [np.empty(0, CHANGE)]
         for block, group in itertools.groupby(table.rows(), lambda row: row.block):
-            rows = iter(group)
-            sample = list(itertools.islice(rows, _SAMPLE))
+            sample = list(itertools.islice(rows := iter(group), _SAMPLE))
             if block.key not in readers:
                 readers[block.key] = SignalReader(file, block, sample)
             changes.append(readers[block.key].read(block, itertools.chain(sample, rows)))
     file.problems.raise_if_any()
-    file.changes = np.concatenate(changes)
-    file.changes = file.changes[np.argsort(file.changes["line"], kind="stable")]
+    table_changes = np.concatenate(changes).view(np.recarray)
+    file.changes = table_changes[np.argsort(table_changes.line, kind="stable")]
     file.rows += len(table.strays)
     file.unread += [row.line for row in table.strays]
     if not len(file.changes):
@@ -106,15 +103,12 @@ class SignalReader:
         used = {column.role: column for column in columns[::-1]}
         is_filled = 2 * sum(value.filled for _, value, _ in self.signals) > len(self.signals)
         has_volts = "volts" in used
-        self.places = {} if has_volts else {x: used[x] for x in ("run", "gate") if x in used}
+        self.places = {x: used[x] for x in ("run", "gate") if x in used and not has_volts}
         self.is_sampled = has_volts or ("level" in used and is_filled)
         self.is_whole = is_filled and (self.is_sampled or len(self.signals) > len(self.clocks))
-        is_level = self.is_sampled and not (has_volts or self.places)
-        self.levels = [x.value.at for x in self.signals if is_level]
-        needed = [*self.places.values(), *itertools.chain(*(x[:2] for x in self.signals))]
-        is_used = {x.at for x in needed}.__contains__
-        self.unused = ", ".join(x.name for x in columns if x.role != "index" and not is_used(x.at))
-        file.notes += [make_reason("columns_unused", columns=self.unused)] if self.unused else []
+        needed = {*self.places.values(), *itertools.chain(*(x[:2] for x in self.signals))}
+        unused = ", ".join(x.name for x in columns if x.role != "index" and x not in needed)
+        file.notes += [make_reason("columns_unused", columns=unused)] if unused else []
         file.lines += [f"  {column}" for column in columns]
         called = {re.sub("[0-9]+", "", clock.name) for clock in self.clocks if not clock.run}
         is_wide = len(self.clocks) > len(called) == 1 and not self.is_sampled
@@ -122,28 +116,29 @@ class SignalReader:
         file.facts |= {*self.places, *["wide"] * is_wide, *["guess"] * is_guess}
         file.facts |= {"sampled"} if self.is_sampled else set()
 
-    def read(self, block: RowBlock, rows: Iterator[Row]) -> Changes:
+    def read(self, block: RowBlock, rows: Iterable[Row]) -> Records:
         """Return the changes that rows say; a row may say that nothing changes, or be unread."""
         file, self.block, self.count = self.file, block, 0
-        self.starts, self.states = dict[int, int](), dict[tuple[int, ...], int]()
+        self.starts, self.states = dict[int, int](), dict[tuple[object, ...], str]()
         self.changes, self.samples = list[Any](), [array("d") for _ in self.signals]
-        words: list[str] | None = None
         signals = [*enumerate(self.signals)]
         for row in rows:
             ticks = {clock.at: self._read_time(row, clock) for clock in self.clocks}
-            before, words = words, [row.cell(at) for at in self.levels] + row.texts[self.width :]
-            if not self.levels or words != before or None in ticks.values():
-                said = {x.clock.at for n, x in signals if self._read_value(n, row, ticks)}
-                timed = {at for at, tick in ticks.items() if tick is not None}
-                is_read = said and said == timed and not any(row.texts[self.width :])
-                file.unread += [] if is_read else [row.line]
+            for role, column in self.places.items():
+                # Of merged cells only the first has a text.
+                if (text := row.cell(column.at)) or column.filled > _SPARSE:
+                    self.above[role] = text
+            read = {x.clock.at for n, x in signals if self._read_value(n, row, ticks)}
+            timed = {at for at, tick in ticks.items() if tick is not None}
+            if not read or read != timed or any(row.texts[self.width :]):
+                file.unread.append(row.line)
             self.count += 1
             if len(self.changes) > MAX_EVENTS:
                 file.problems.refuse(row.line, "too_many_events", limit=MAX_EVENTS)
         file.rows += self.count
-        for n, signal in enumerate(self.signals):
+        for n, signal in signals:
             if signal.value.role == "volts":
-                self._find_crossings(n, row)
+                self._find_crossings(n)
         if self.is_sampled and 2 * len({change[0] for change in self.changes}) < self.count:
             lasting = [self.latest[at] - start for at, start in self.starts.items()]
             file.period = max(lasting, default=0) // max(1, self.count - 1)
@@ -178,33 +173,28 @@ class SignalReader:
         word, tick = row.cell(value.at), ticks[clock.at]
         if tick is None or not (word or self.is_sampled or value.role == "moment"):
             return False
-        state = code_of(value.role, value.words.get(word, word) or value.state)
+        state = meaning_of(value.role, value.words.get(word, word) or value.state)
         if value.role == "volts" and is_number(word):
             self.samples[n].extend((row.line, tick - self.starts[clock.at], float(word)))
-        elif state == _REJECTED:
+        elif state is None:
             self._reject(row, value, word)
         elif state or not self.is_sampled:
-            place = self._place_of(n, row)
-            before = self.states.get((n, *place))
-            self.states[n, *place] = state
+            key = n, *self.above.values()
+            before, self.states[key] = self.states.get(key), state
             if not self.is_whole or before != state:
                 # A first row may be the state at the beginning of a run, and no change.
-                is_first = self.is_whole and before is None
-                self.changes.append((row.line, tick, state, *place, is_first))
+                is_first, code = self.is_whole and before is None, STATES.index(state)
+                self.changes.append((row.line, tick, code, *self._place_of(n), is_first))
         return True
 
-    def _place_of(self, n: int, row: Row) -> tuple[int, ...]:
+    def _place_of(self, n: int) -> tuple[int, ...]:
         """Return run and input, in the row, its heading or a mark above, column and block."""
-        (clock, value, label), block, file = self.signals[n], self.block, self.file
-        names = {"run": clock.run or value.run or block.run, "gate": label or block.gate}
-        for role, column in self.places.items():
-            text = row.cell(column.at)
-            if column.filled <= _SPARSE:  # of merged cells only the first has a text
-                text = self.above[role] = text or self.above.get(role, "")
-            names[role] = text or names[role]
-        return *map(file.place_of, names.values()), clock.at, block.number
+        clock, value, label = self.signals[n]
+        run = self.above.get("run") or clock.run or value.run or self.block.run
+        gate = self.above.get("gate") or label or self.block.gate
+        return self.file.names[run], self.file.names[gate], clock.at, self.block.number
 
-    def _find_crossings(self, n: int, row: Row) -> None:
+    def _find_crossings(self, n: int) -> None:
         """Keep where volts cross the middle; note how many do, or that nothing passes."""
         clock, _, label = self.signals[n]
         samples = np.array(self.samples[n]).reshape(-1, 3)
@@ -215,8 +205,9 @@ class SignalReader:
             code, values = "no_passage", {"low": low, "high": high}
         self.file.notes.append(make_reason(code, input=label, **values))
         for line, offset, is_high in crossings.tolist():
-            tick = self.starts[clock.at] + round(offset)  # and 3 is low in `STATES`, 4 high
-            self.changes.append((int(line), tick, 3 + int(is_high), *self._place_of(n, row), False))
+            state = STATES.index("high" if is_high else "low")
+            tick = self.starts[clock.at] + round(offset)
+            self.changes.append((int(line), tick, state, *self._place_of(n), False))
 
     def _reject(self, row: Row, column: TimerColumn, text: str) -> None:
         """Note a cell whose value is not accepted."""
@@ -225,10 +216,10 @@ class SignalReader:
 
 
 @lru_cache(10_000)
-def code_of(role: str, word: str) -> int:
-    """Return what a word means in such a column: a place in `STATES`, or the one behind them."""
+def meaning_of(role: str, word: str) -> str | None:
+    """Return one of `STATES`: what a word means in such a column; `None` if it is not accepted."""
     state, accepted = state_of(word), roles()[role][-1].split()
     if state in {"unknown", "missing"} and role in {*SAMPLED, "moment"}:
-        return 0
+        return ""
     state = dict(zip(("zero", "one"), accepted, strict=False)).get(state, state)
-    return STATES.index(state) if state in accepted else _REJECTED
+    return state if state in accepted else None

@@ -6,12 +6,13 @@ What a file does not say (which gate, which level is dark, which unit) is left t
 
 from __future__ import annotations
 
+import itertools
+from collections import defaultdict
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.reasons import Reason, make_reason
 from rig.timers.problems import ProblemList
@@ -20,14 +21,20 @@ from rig.timers.vocabulary import number_of
 STATES = ("", "clear", "blocked", "low", "high")
 """What begins with a change, of a beam or of a signal, in turns clear and blocked, or low and high;
 nothing where the file does not say."""
-_FIELDS = "line:i4 tick:O state:i1 run:i4 label:i4 clock:i4 block:i4 first:?"
-CHANGE = np.dtype([tuple(name.split(":")) for name in _FIELDS.split()])
+
+
+def record_type(fields: str) -> np.dtype[np.void]:
+    """Return the type of rows with such fields, each ``name:type``."""
+    return np.dtype([tuple(field.split(":")) for field in fields.split()])
+
+
+CHANGE = record_type("line:i4 tick:O state:i1 run:i4 label:i4 clock:i4 block:i4 first:?")
 """A change at an input: its line; its time, ps (of a date it needs more than 64 bits); which of
 `STATES` begins; what the file calls the run and the input (places in `TimerFile.names`); which
 column of times it is of, where several are alike; the block of rows; and whether it is a first row,
 which may say the state at the beginning."""
-Changes: TypeAlias = NDArray[Any]
-"""Rows of `CHANGE`."""
+Records: TypeAlias = Any
+"""Rows with named fields, a record array."""
 
 
 @dataclass(eq=False, slots=True)
@@ -43,7 +50,7 @@ class TimerFile:
     lines
         In words: what kind of file, and what each column was taken for.
     names
-        Places of the names of inputs and runs, the empty one first.
+        Places of the names of inputs and runs, the empty one first; a new name has the next.
     changes
         All of them, in the order of the lines.
     period
@@ -73,8 +80,10 @@ class TimerFile:
     way: int = 0
     ways: int = 1
     lines: list[str] = field(default_factory=list)
-    names: dict[str, int] = field(default_factory=lambda: {"": 0})
-    changes: Changes = field(init=False)
+    names: dict[str, int] = field(
+        default_factory=lambda: defaultdict(itertools.count(1).__next__, {"": 0})
+    )
+    changes: Records = field(init=False)
     period: int | None = None
     powers: set[int | None] = field(default_factory=set)
     facts: set[str] = field(default_factory=set)
@@ -89,17 +98,8 @@ class TimerFile:
         self.problems = ProblemList(str(self.path), make_reason("timer_files").text)
 
     @property
-    def is_stacked(self) -> bool:
-        """Whether runs may stand one below the other; they part where times begin anew."""
-        return self.facts.isdisjoint({"sampled", "run"})
-
-    @property
     def labels(self) -> list[str]:
         """What the file calls inputs that change, in order; none where it does not say."""
-        names, changes = [*self.names], self.changes[~self.changes["first"]]
-        labels = [names[label] for label in np.unique(changes["label"]) if label]
+        names, changes = [*self.names], self.changes[~self.changes.first]
+        labels = [names[label] for label in np.unique(changes.label) if label]
         return sorted(labels, key=lambda label: (number_of(label) or 0, label))
-
-    def place_of(self, name: str) -> int:
-        """Return the place of a name, which is new or known."""
-        return self.names.setdefault(name, len(self.names))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Collection
 from functools import cache, lru_cache
 
 from rig.text_rows import read_rows
 
-POWERS = {"s": 0, "ms": 3, "us": 6, "ns": 9}
+POWERS = {"s": 0, "ms": 3, "0.1 ms": 4, "us": 6, "ns": 9}
 """Decimal power from seconds, by the unit's name."""
-SYMBOLS = {0: "s", 3: "ms", 6: "µs", 9: "ns", None: "an unknown unit"}
+SYMBOLS = {0: "s", 3: "ms", 4: "0.1 ms", 6: "µs", 9: "ns", None: "an unknown unit"}
 LONGEST = 200
 """Characters: no cell, and no line of named values, is longer."""
 
@@ -135,6 +136,11 @@ def kinds_of(text: str) -> frozenset[str]:
     if not kinds or ("input" in kinds and "start" in roles_in(text)):
         return frozenset()
     return frozenset(kinds | {detail for detail in _DETAILS if form(detail).fullmatch(text)})
+
+
+def holds(rule: str, facts: Collection[str]) -> bool:
+    """Whether facts fulfil a rule of a table: all that it names are there, those with ``-`` not."""
+    return all((fact.lstrip("-") in facts) is (fact[0] != "-") for fact in rule.split())
 
 
 def is_remark(line: str) -> bool:

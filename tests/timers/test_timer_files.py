@@ -34,7 +34,7 @@ def drops_of(file, channels: dict[str, int], bars: int) -> list[Drop]:
     file.stated["channels"] = channels
     layout = next(find_layouts(file, list(channels.values()), bars))
     reading = FileReading(file, layout)
-    return list(map(reading.drop, range(len(reading.runs))))
+    return list(map(reading.drop, reading.runs))
 
 
 def read(tmp_path: Path, content: str | bytes, bars: int = 8) -> list[Drop]:
