@@ -74,7 +74,7 @@ class TimerColumn:
     filled: float = 0.0
 
     def __str__(self) -> str:
-        meaning = " or ".join(roles()[role][0] for role in self.role.split("|"))
+        meaning = roles()[self.role][0]
         meaning += f" in {vocabulary.SYMBOLS[self.power]}" * (self.role == "time")
         high = "".join(f": {word!r} is high" for word in [*self.words][:1])
         return f"{self.name}: {meaning}{high}"
@@ -229,7 +229,7 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
     """Return what holds of the values of a column, of which some may be missing."""
     known = [*filter(vocabulary.kinds_of, texts)]
     texts = known if 2 * len(known) > len(texts) else texts  # a broken cell makes no other kind
-    kinds = list(map(vocabulary.kinds_of, texts))
+    kinds, distinct = list(map(vocabulary.kinds_of, texts)), {*texts}
     facts = {f"all.{kind}" for kind in frozenset.intersection(*kinds)}
     facts |= {f"any.{kind}" for kind in frozenset().union(*kinds)}
     numbers = [float(text) for text in texts if is_number(text)]
@@ -242,9 +242,9 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
             "words": not numbers,
             "counts": steps == {1.0},
             "far": len(numbers) > 1 and abs(numbers[-1] - numbers[0]) > 100,
-            "few": "all.whole" in facts and len(texts) >= 2 * len(set(texts)),
-            "constant": len(set(texts)) == 1 < len(texts),
-            "pair": len(set(texts)) == 2 and not re.search("[0-9]", "".join(set(texts))),
+            "few": "all.whole" in facts and len(texts) >= 2 * len(distinct),
+            "constant": len(distinct) == 1 < len(texts),
+            "pair": len(distinct) == 2 and not re.search("[0-9]", "".join(distinct)),
             "many": len(texts) > 30,
         }
     )

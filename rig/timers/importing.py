@@ -149,12 +149,13 @@ def _find_readings(options: Namespace, gates: Sequence[int], bars: int) -> list[
         pairs = ",".join(f"{name}={n}" for name, n in zip(labels, gates, strict=False))
         values = {"inputs": ", ".join(labels), "channels": ", ".join(map(str, gates))}
         raise refusal(options.events, "inputs_unclear", **values, pairs=pairs)
-    shortest = min(readings, key=lambda reading: max(reading.lasting.values()))
-    if (lasting := max(shortest.lasting.values())) > LONGEST_DROP:
+    lasting = {reading: max(reading.lasting.values()) for reading in readings}
+    shortest = min(readings, key=lasting.__getitem__)
+    if lasting[shortest] > LONGEST_DROP:
         place = f"{options.events}:{shortest.edges.line[shortest.edges.tick.argmax()]}:1"
-        limit = {"lasting_s": lasting / TICK_HZ, "limit_s": LONGEST_DROP / TICK_HZ}
+        limit = {"lasting_s": lasting[shortest] / TICK_HZ, "limit_s": LONGEST_DROP / TICK_HZ}
         raise refusal(place, "too_long", **limit)
-    return [reading for reading in readings if max(reading.lasting.values()) <= LONGEST_DROP]
+    return [reading for reading in readings if lasting[reading] <= LONGEST_DROP]
 
 
 def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[FileReading, FallMatch]:
@@ -194,8 +195,8 @@ def _refuse_impossible(reading: FileReading, place: str) -> None:
     An input that has a name is no wire of all gates, unless the user stated so.
     """
     file, layout = reading.file, reading.layout
-    is_wire = layout.groups == "passing" and "wide" not in file.facts and bool(file.labels)
-    if is_wire and "groups" not in file.stated:
+    is_wire = layout.groups == "passing" and "wide" not in file.facts
+    if is_wire and file.labels and "groups" not in file.stated:
         raise refusal(place, "one_wire", option=str(layout))
     earlier: dict[object, int] = {}
     for run, edges in reading.runs.items():

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import re
 from array import array
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import closing
 from functools import lru_cache
 from typing import Any
@@ -49,10 +49,9 @@ def read_file(file: TimerFile) -> TimerFile:
     readers, changes = dict[object, SignalReader](), [np.empty(0, CHANGE)]
     with closing(read_lines(file.path)) as lines:
         head = list(itertools.islice(lines, 50))
-        numbered: Iterator[tuple[int, str]] = enumerate(itertools.chain(head, lines), 1)
-        if "".join(head).lstrip().startswith(BEGINNINGS):
-            numbered = vcd_rows(numbered, file.problems)
-        table = Table(numbered)
+        numbered = enumerate(itertools.chain(head, lines), 1)
+        is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
+        table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered)
         file.lines += [f"a table, its cells separated by {_MARKS[table.separator]}"]
         for block, group in itertools.groupby(table.rows(), lambda row: row.block):
             sample = list(itertools.islice(rows := iter(group), _SAMPLE))

@@ -84,11 +84,10 @@ class RowBlock:
         filled
             Columns that have values.
         """
-        is_numbered = form("time and numbers").fullmatch
-        remarks = (row for row in self.remarks if not form("assignment").search(row.texts[0]))
-        ranked = list[tuple[int, int, Row]]()
-        for row in self.headings or [row for row in remarks if len(row.texts) == width]:
-            if any(map(_is_value, row.texts)) and not is_numbered(row.raw):
+        is_setting, ranked = form("assignment").search, list[tuple[int, int, Row]]()
+        remarks = [x for x in self.remarks if len(x.texts) == width and not is_setting(x.texts[0])]
+        for row in self.headings or remarks:
+            if any(map(_is_value, row.texts)) and not form("time and numbers").fullmatch(row.raw):
                 ranked = [rank for rank in ranked if rank[0] >= len(filled)]
             elif (
                 (known := row.count_known(filled))
@@ -226,8 +225,8 @@ class Table:
     def rows(self) -> Iterator[Row]:
         """Yield each row of data."""
         block, is_plain = RowBlock(self.remarks, []), form("plain row").fullmatch
-        names = [name for name, _ in self._names]
-        block.headings += [Row(0, names, "", block)] if not self.separator else []
+        if not self.separator:
+            block.headings.append(Row(0, [name for name, _ in self._names], "", block))
         for number, line in self._lines:
             if not line.strip():
                 continue
@@ -320,9 +319,10 @@ def _named_values(line: str) -> list[tuple[_Name, str]]:
 
 def _find_names(lines: Sequence[str]) -> tuple[list[_Name], int]:
     """Return what most lines name before their values, and how many values they name so."""
-    rows = [tuple(name for name, _ in _named_values(line)) for line in lines[-_JUDGED:]]
-    usual, count = Counter(filter(None, rows)).most_common(1)[0] if any(rows) else ((), 0)
-    is_named = any(name[1:] for name, _ in usual) and 2 * count > sum(map(bool, rows))
+    rows = Counter(tuple(name for name, _ in _named_values(line)) for line in lines[-_JUDGED:])
+    del rows[()]
+    usual, count = next(iter(rows.most_common(1)), ((), 0))
+    is_named = any(name[1:] for name, _ in usual) and 2 * count > rows.total()
     return ([*usual], count * len(usual)) if is_named else ([], 0)
 
 
@@ -341,9 +341,9 @@ def find_separator(lines: Sequence[str], named: int) -> str:
     if 2 * len(pairs) > len(rows) and not is_named and sorted(numbers) == numbers:
         # Times go on with decimal commas; but few numbers that return are states, or gates, and
         # numbers that all rise are times themselves.
-        behind, parts = {pair[1] for pair in pairs}, [part for pair in pairs for part in pair]
+        parts = [*itertools.chain(*pairs)]
         is_time = all(map(str.isdigit, parts)) and sorted(parts, key=int) == parts
-        if not is_time and len(behind) > min(2 + len(pairs) // 4, len(pairs) // 2):
+        if not is_time and len({*parts[1::2]}) > min(2 + len(pairs) // 4, len(pairs) // 2):
             return ";"
     counts = {"": (named, 0)} if named else {}
     marks = [mark for mark in "\t;|" if 2 * sum(mark in row for row in rows) > len(rows)]
