@@ -14,6 +14,7 @@ from rig.analysis import processes
 from rig.analysis.session import analyze
 from tests.analysis.drops import FENCE, case
 from tests.analysis.sessions import MILD
+from tests.cli.lab import ROOT
 from tests.waiting import PATIENCE_S
 
 ENDLESS = """
@@ -78,8 +79,9 @@ def test_with_the_first_process_all_others_end_at_once(killed, tmp_path):
     script = tmp_path / "endless.py"
     script.write_text(ENDLESS)
     command = [sys.executable, str(script)]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    with subprocess.Popen(command, **pipes, text=True, start_new_session=True) as process:
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    options["env"] = os.environ | {"PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(command, **options, text=True, start_new_session=True) as process:
         for _ in range(6):  # four here, and one in each of two processes
             assert process.stdout.readline() == "begun\n"
         began = time.monotonic()
