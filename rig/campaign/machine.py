@@ -319,7 +319,9 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
         case EffectFailure(flow.ticket):
             return _effect_failed(flow, event)
         case Tick(seconds) if flow.stage is Stage.COUNTDOWN:
-            return _tick(flow, seconds)
+            if seconds < flow.left_s:
+                return replace(flow, left_s=flow.left_s - seconds), ()
+            return replace(flow.to(Stage.FIRING), left_s=0.0), (FireRelease(flow.token),)
         case DropVerdict(flow.ticket, verdict, reasons, row) if flow.stage is Stage.JUDGING:
             row = flow.row if row is None else row
             judged = verdict, reasons
@@ -405,13 +407,6 @@ def _take_refusal(flow: Flow, event: EffectFailure) -> Outcome:
     return replace(flow.to(Stage.SETTLING), refusals=refusals), (Wait(pause),)
 
 
-def _tick(flow: Flow, seconds: float) -> Outcome:
-    seconds_left = flow.left_s - seconds
-    if seconds_left > 0.0:
-        return replace(flow, left_s=seconds_left), ()
-    return replace(flow.to(Stage.FIRING), left_s=0.0), (FireRelease(flow.token),)
-
-
 def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Outcome:
     if flow.stage is Stage.PREPARE and job is not None:
         return replace(flow, job=job).to(Stage.SETTLING), (Wait(settle_s),)
@@ -425,8 +420,7 @@ def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Outcome:
 
 def _onward(flow: Flow, job: Job | None) -> Outcome:
     """Go to the next attempt, unless the last ones say that it would be void too."""
-    why = why_halted(flow.row) if flow.stage is Stage.RESULT else ""
-    if why:
+    if flow.stage is Stage.RESULT and (why := why_halted(flow.row)):
         return replace(flow.to(Stage.HALTED, why), row=()), ()
     if job is None:
         return flow.to(Stage.DONE), ()

@@ -117,7 +117,7 @@ class Line:
             self._socket.shutdown(socket.SHUT_RDWR)
 
     def _read(self) -> None:
-        over = _gone("it hung up")
+        over = rig_error("daemon_gone", text="it hung up")
         try:
             with self._socket.makefile("rb") as stream:
                 while (line := stream.readline(rpc.MESSAGE_LIMIT)).endswith(b"\n"):
@@ -125,7 +125,7 @@ class Line:
         except RigError as error:
             over = error
         except OSError as error:
-            over = _gone(error)
+            over = rig_error("daemon_gone", text=error)
         finally:
             with self._guard:
                 self._over, unanswered = over, [*self._open.values()]
@@ -361,10 +361,6 @@ def _result(answer: Future[Any], patience_s: float, silent: RigError) -> Any:
         if wait([answer], _HEED_S).done:
             return answer.result()
     raise silent
-
-
-def _gone(why: object) -> RigError:
-    return rig_error("daemon_gone", text=why)
 
 
 def _reach(path: Path) -> socket.socket:

@@ -113,7 +113,9 @@ class Server:
             for task in ended:
                 if isinstance(error := task.exception(), InputError):
                     # Where stderr went may be deleted with the socket.
-                    logging.getLogger().addHandler(_log_file())
+                    handler = logging.FileHandler(make_folder(state_folder()) / "daemon.log")
+                    handler.setFormatter(logging.Formatter("%(asctime)s %(process)d: %(message)s"))
+                    logging.getLogger().addHandler(handler)
                     log.error("%s", error)
                 elif error is not None:
                     log.error("a part of the daemon failed, so it ends; start it again to go on")
@@ -223,9 +225,3 @@ class Server:
         elif self._idle_s is not None and now - self._left_at >= self._idle_s:
             log.info("no client for %g s; nothing armed, falling or unsaved", self._idle_s)
             self.end()
-
-
-def _log_file() -> logging.Handler:
-    handler = logging.FileHandler(make_folder(state_folder()) / "daemon.log")
-    handler.setFormatter(logging.Formatter("%(asctime)s %(process)d: %(message)s"))
-    return handler

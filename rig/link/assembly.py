@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
+from functools import cache
 from typing import Any
+
+import msgspec
 
 from rig.boards import GATES
 from rig.link import messages as wire
@@ -62,7 +65,7 @@ class Assembly:
 
     def add(self, frame: wire.EventsFrame) -> None:
         """Take events; what was there already is replaced, so a re-read repairs."""
-        self._events |= dict(enumerate(wire.EVENT.iter_unpack(frame.events), frame.first))
+        self._events.update(enumerate(wire.EVENT.iter_unpack(frame.events), frame.first))
 
     def missing(self, first: int = 0) -> list[int]:
         """List the numbers of events, from `first` on, that are not known.
@@ -73,7 +76,7 @@ class Assembly:
             Empty while there is no certificate to say how many there are.
         """
         total = self.certificate.events if self.certificate else 0
-        return [number for number in range(first, total) if number not in self._events]
+        return sorted({*range(first, total)}.difference(self._events))
 
     def sound(self) -> bool:
         """Whether every event and the certificate are in and agree."""
@@ -117,16 +120,17 @@ class Assembly:
     def _crc(self) -> int:
         """CRC-32 over all events, as they are on the wire; none is missing."""
         total = self.certificate.events if self.certificate else 0
-        return zlib.crc32(wire.pack_events(self._events[number] for number in range(total)))
+        return zlib.crc32(wire.pack_events(map(self._events.__getitem__, range(total))))
 
     def _edges(self, state: int, fire_tick: int | None) -> tuple[Edge, ...]:
         if fire_tick is None:
             return ()
-        seen, known = self.certificate, {-1: (0, state), **self._events}
-        numbers = sorted(n for n in self._events if seen is None or n < seen.events)
+        seen, known = self.certificate, self._events
+        numbers = sorted(known.keys() & range(seen.events) if seen else known)
         # Behind a gap it is not known when the gates changed: no edge is better than a wrong one.
-        snapshots = ((*known[n], known.get(n - 1, known[n])[1]) for n in numbers)
-        return tuple(edges(snapshots, seen.gates if seen else self.gates, fire_tick))
+        before = [known.get(n - 1, known[n])[1] if n else state for n in numbers]
+        gates, events = (seen or self).gates, map(known.__getitem__, numbers)
+        return edges(events, before, gates, fire_tick)
 
     def _faults(self, tick_hz: int) -> Iterator[Reason]:
         if not tick_hz:
@@ -154,24 +158,34 @@ def _account(seen: wire.DropCertificate) -> Certificate:
     return Certificate(**values | {"release_sense": sense})
 
 
-def edges(snapshots: Iterable[tuple[int, int, int]], gates: int, fire_tick: int) -> Iterator[Edge]:
-    """Yield the edges that snapshots of the gates show, by snapshot and channel.
+def edges(
+    events: Iterable[Sequence[int]], before: Iterable[int], gates: int, fire_tick: int
+) -> tuple[Edge, ...]:
+    """List the edges that events show, by event and channel.
 
     Parameters
     ----------
-    snapshots
-        Tick (u32) and state of the gates, and their state before.
+    events
+        Tick (u32) and state of the gates.
+    before
+        State of the gates before each of them.
     gates
         Mask of the gates that count.
     fire_tick
         Tick of the release.
     """
-    for tick, state, before in snapshots:
-        changed, since = (before ^ state) & gates, ticks_since(fire_tick, tick)
-        while changed:
-            lowest = changed & -changed
-            yield Edge(since, lowest.bit_length() - 1, bool(state & lowest))
-            changed ^= lowest
+    values = [
+        (ticks_since(fire_tick, tick), channel, state >> channel & 1 == 1)
+        for (tick, state), old in zip(events, before, strict=False)
+        for channel in _channels((old ^ state) & gates)
+    ]
+    return msgspec.convert(values, tuple[Edge, ...])  # in a third of the time of one by one
+
+
+@cache
+def _channels(mask: int) -> list[int]:
+    """List the channels of a mask of 16 bits."""
+    return [n for n in range(GATES) if mask >> n & 1]
 
 
 def ticks_since(fire_tick: int, tick: int) -> int:

@@ -25,6 +25,7 @@ import typing
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields
 from enum import IntEnum
+from itertools import starmap
 from typing import Annotated, Any, NamedTuple, TypeAlias, dataclass_transform
 
 from rig.boards import Capabilities
@@ -57,7 +58,7 @@ EVENT = struct.Struct("<IH")
 
 def pack_events(events: Iterable[tuple[int, int]]) -> bytes:
     """Write ticks and states as they stand in a frame; one that does not fit is a struct.error."""
-    return b"".join([EVENT.pack(*event) for event in events])
+    return b"".join(starmap(EVENT.pack, events))
 
 
 class UnsignedInt(NamedTuple):
@@ -71,8 +72,10 @@ class UnsignedInt(NamedTuple):
 
     def unpack(self, payload: bytes, at: int) -> tuple[int, int]:
         """Read a value; give where the next one starts, too."""
-        value, end = Raw(self.size).unpack(payload, at)
-        return int.from_bytes(value, "little"), end
+        value = payload[at : at + self.size]
+        if len(value) < self.size:
+            raise ValueError(f"{len(value)} bytes of records of {self.size}")
+        return int.from_bytes(value, "little"), at + self.size
 
 
 class Raw(NamedTuple):

@@ -223,13 +223,15 @@ class Transcript:
         # Only the first answer counts: a repeated ARMED must not begin the drop a second time.
         asked = request if seq and frame.ack == seq and not self._answered else None
         self._answered = self._answered or asked is not None
-        match message:
-            case wire.Identity():
-                self.identity = message
-                self._opened_ns = None
+        match message:  # the most frequent first
+            case wire.EventsFrame() if message.label not in self._given:
+                self.assembly(message.label).add(message)
             case wire.Pong(tick) if frame.ack in self._asked_ns:
                 self.sample = ClockSample(self._asked_ns.pop(frame.ack), host_ns, tick)
                 records.append(self.sample)
+            case wire.Identity():
+                self.identity = message
+                self._opened_ns = None
             case wire.ReferencePulse(count, tick) if count and frame.ack in self._asked_ns:
                 records.append(Pulse(self._asked_ns.pop(frame.ack), host_ns, count, tick))
             case wire.Armed(token):
@@ -247,8 +249,6 @@ class Transcript:
                     self._fired = label, host_ns
             case wire.Refused(wire.RefusalReason.NOT_KEPT, first) if isinstance(asked, wire.Read):
                 self.assembly(asked.label).first_kept = first
-            case wire.EventsFrame(label=label) if label not in self._given:
-                self.assembly(label).add(message)
             case wire.DropCertificate(label=label) if label not in self._given:
                 self.assembly(label).certificate = message
                 self._fired = None

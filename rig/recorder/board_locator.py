@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rig.errors import RigError
 from rig.link.messages import Identity
 from rig.reasons import rig_error
 from rig.usb.listing import path_of, serial_number_at, serial_ports
@@ -61,7 +60,8 @@ class BoardLocator:
         if (path := path_of(self.serial_number, ports)) is not None:
             self.path = path
         elif serial_number is not None and self.bound:
-            raise _stranger(f"serial number {serial_number}, not {self.serial_number}", self.url)
+            text = f"serial number {serial_number}, not {self.serial_number}"
+            raise rig_error("other_board", port=self.url, difference=text)
         return self.path
 
     def seek(self, serial_number: str | None) -> None:
@@ -89,13 +89,9 @@ class BoardLocator:
             It is not the board that it must be.
         """
         if self.bound and self._unique_id not in {None, identity.unique_id}:
-            known = (self._unique_id or b"").hex()
-            raise _stranger(f"id {identity.unique_id.hex()}, not {known}", self.path)
+            text = f"id {identity.unique_id.hex()}, not {(self._unique_id or b'').hex()}"
+            raise rig_error("other_board", port=self.path, difference=text)
         self._unique_id = identity.unique_id
         if "://" not in self.path:
             self.serial_number = serial_number_at(self.path)
         return {} if self.serial_number is None else {SERIAL_NUMBER: self.serial_number}
-
-
-def _stranger(which: str, where: str) -> RigError:
-    return rig_error("other_board", port=where, difference=which)

@@ -99,10 +99,9 @@ class StateFeed:
         if frame.first > number and frame.snapshots:
             self._gates = frame.snapshots[0].state  # it is not known when the gates changed
         before = [self._gates, *(event.state for event in frame.snapshots)]
-        shown = ((*event, state) for event, state in zip(frame.snapshots, before, strict=False))
         self._gates = before[-1]
         if not self._blind:
-            self._published.edges(map(_row, edges(shown, ALL_GATES, fire_tick)))
+            self._published.edges(map(_row, edges(frame.snapshots, before, ALL_GATES, fire_tick)))
         self._published.set(gates={"blocked": self._gates})
         self._show(state="fired", events=frame.first + len(frame.snapshots))
 

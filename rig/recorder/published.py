@@ -21,8 +21,8 @@ def link_state(state: str, error: object = None, retry_s: float | None = None) -
     return {"state": state, "error": error, "retry_s": retry_s}
 
 
-_EMPTY = "daemon", "port", "device", "statistics", "gates", "drop", "release_test", "session"
-_FIRST = dict.fromkeys((*_EMPTY, "control", "error")) | {
+_SHOWN = "daemon port device statistics gates drop release_test session control error"
+_FIRST: dict[str, Any] = dict.fromkeys(_SHOWN.split()) | {
     "link": link_state("closed"),
     "phase": "idle",
     "clients": 0,

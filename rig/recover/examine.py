@@ -13,6 +13,7 @@ from rig.recover.pages import Pages
 from rig.recover.rows import Rows, find_rows
 from rig.recover.snapshot import SessionCopy, take_snapshot
 from rig.session.drop_check import Fate
+from rig.session.hashes import check_chain
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, TABLES, RunState
 
 _NUMBERED = {name: table.meaning for name, table in TABLES.items() if table.numbered}
@@ -91,7 +92,7 @@ def examine(path: str | Path) -> ExaminedFile:
         **{f"{rows.gaps(table)} {name}": rows.gaps(table) for table, name in _NUMBERED.items()},
         **{_describe_fate(drop): drop.fate is Fate.PARTIAL for drop in drops},
     }
-    damaged = [*filter(damage.get, damage), *rows.chain_faults()]
+    damaged = [*filter(damage.get, damage), *check_chain(rows.tables)]
     return ExaminedFile(snapshot, rows, drops, "", damaged, [*filter(lost.get, lost)])
 
 

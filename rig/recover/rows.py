@@ -7,8 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from rig.recover.pages import Pages, read_cells
-from rig.session.hashes import check_chain
-from rig.session.rows import RowError, check_row
+from rig.session.rows import RowError, check_rows
 from rig.session.schema import TABLES, Row
 
 _TRIP_NS = 60 * 10**9  # longest round trip of an answer
@@ -31,7 +30,7 @@ class Rows:
         for name, table in TABLES.items():
             if (rowid is None) == (table.key > 1) and len(row) in table.lengths:
                 with suppress(RowError):
-                    check_row(name, row)
+                    check_rows(name, [row])
                     # Breaks of the host have the same columns as clock samples.
                     if name != "ping" or 0 <= row[2] - row[1] <= _TRIP_NS:
                         key = row[: table.key] if rowid is None else (rowid,)
@@ -65,10 +64,6 @@ class Rows:
         numbers = self.tables[table]
         hashed = (last for _, covered, last, _ in self.tables["hash"].values() if covered == table)
         return int(max([0, *hashed, *(number for (number,) in numbers)])) - len(numbers)
-
-    def chain_faults(self) -> list[str]:
-        """Return the alterations by the hash chain; empty without a chain."""
-        return check_chain(self.tables)
 
 
 def find_rows(pages: Pages) -> Rows:

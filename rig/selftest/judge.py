@@ -50,14 +50,14 @@ class JudgeBoard(BoardUnderTest):
     def measure_stamps(self, board: BoardUnderTest) -> str:
         """See how exactly all gates stamp pulses whose length is known, from 1 µs on."""
         recorded, judged = self._pulse(board, BEAMS, _LONG_US, AT_BEAMS)
-        self.rate = _flanks(recorded, AT_BEAMS)[1] / judged.certificate.pulse_ticks
+        self.rate = _flanks(recorded)[1] / judged.certificate.pulse_ticks
         hz = board.identity.tick_hz
         ppm = 1e6 * (self.rate * self.identity.tick_hz / hz - 1)
         _limit("the clocks differ by", [ppm], 2e6 * RESONATOR_TOLERANCE, "ppm")
         errors, skews = [], []
         for n in range(board.options.drops):
             recorded, judged = self._pulse(board, BEAMS, 1 + _STEP_US * n, AT_BEAMS)
-            skew, length = _flanks(recorded, AT_BEAMS)
+            skew, length = _flanks(recorded)
             errors.append(1e9 / hz * (length - judged.certificate.pulse_ticks * self.rate))
             skews.append(1e9 / hz * skew)
         late_ns = 1e9 / hz * board.identity.late_ticks
@@ -152,9 +152,9 @@ def _changes(recorded: RecordedDrop, gate: int) -> tuple[int, int]:
     return ticks[0], ticks[1]
 
 
-def _flanks(recorded: RecordedDrop, gates: int) -> tuple[int, int]:
-    """Give by how much gates that change together differ, and how long they were blocked, ticks."""
-    masks = [1 << n for n in range(gates.bit_length()) if gates >> n & 1]
+def _flanks(recorded: RecordedDrop) -> tuple[int, int]:
+    """Give by how much gates at the beams differ, and how long they were blocked, ticks."""
+    masks = (1 << n for n in range(AT_BEAMS.bit_length()))
     rises, falls = zip(*(_changes(recorded, mask) for mask in masks), strict=True)
     return max(max(rises) - min(rises), max(falls) - min(falls)), falls[0] - rises[0]
 

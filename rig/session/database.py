@@ -53,8 +53,7 @@ def build(path: Path, first: Record) -> None:
         with replacing(path) as stream:
             stream.write(content)
     except InputError as error:
-        text = error.__cause__ or error
-        raise rig_error("session_unmade", path=path, text=text) from error
+        raise rig_error("session_unmade", path=path, text=error.__cause__ or error) from error
 
 
 def check_place(path: Path) -> None:

@@ -10,10 +10,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import fields, replace
 from enum import StrEnum
 from itertools import groupby
-from typing import Any, Literal
+from typing import Any
 
 from rig.link.messages import TEST_RUN, pack_events
-from rig.link.transcript import Incoming, Record, Restart, Transcript
+from rig.link.transcript import Direction, Incoming, Restart, Transcript
 from rig.records import Certificate, ClockSample, Drop, Edge, Job, Pulse
 
 _U32 = (1 << 32) - 1
@@ -52,11 +52,11 @@ class ByteReplay:
         self.records: list[Drop | ClockSample | Pulse | Restart] = []
         self._transcript = Transcript()
 
-    def feed(self, chunks: Iterable[tuple[int, Literal["rx", "tx"], bytes]]) -> None:
+    def feed(self, chunks: Iterable[tuple[int, Direction, bytes]]) -> None:
         """Decode the next chunks: host time, direction and bytes."""
         for host_ns, direction, data in chunks:
             self.fed += 1
-            records: Iterable[Record] = self._transcript.feed(direction, host_ns, data)
+            records = self._transcript.feed(direction, host_ns, data)
             self.records += [record for record in records if not isinstance(record, Incoming)]
 
     def acknowledged_drops(self) -> list[Drop]:

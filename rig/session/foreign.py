@@ -51,8 +51,7 @@ def check_schema(path: Path, connection: sqlite3.Connection) -> int:
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     if application != APPLICATION_ID:
-        text = "it is another program's SQLite database"
-        raise rig_error("not_a_session", path=path, text=text)
+        raise rig_error("not_a_session", path=path, text="it is another program's SQLite database")
     if version < 1:
         raise rig_error("not_a_session", path=path, text="it was never finished")
     if version > SCHEMA_VERSION:

@@ -116,7 +116,5 @@ def _digest(before: bytes, table: str, rows: Iterable[Sequence[Any]]) -> bytes:
 
 
 def _strip(row: Sequence[Any]) -> list[Any]:
-    values = list(row)
-    while values and values[-1] is None:
-        values.pop()
-    return values
+    last = max((n for n, value in enumerate(row, 1) if value is not None), default=0)
+    return [*row[:last]]

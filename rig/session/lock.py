@@ -34,7 +34,7 @@ class WriterLock:
     def __init__(self, session: Path) -> None:
         from filelock import FileLock, Timeout, has_fcntl  # noqa: PLC0415 - not for who only reads
 
-        self.path = _place(session)
+        self.path = session.with_name(session.name + ".lock")
         self._lock = FileLock(
             self.path, _LOOK_S, thread_local=False, poll_interval=_POLL_S, fallback_to_soft=False
         )
@@ -67,10 +67,6 @@ class WriterLock:
             self._lock.release()
 
 
-def _place(session: Path) -> Path:
-    return session.with_name(session.name + ".lock")
-
-
 def _holder(lock: Path) -> str:
     owner = ""
     with suppress(OSError):
@@ -80,7 +76,7 @@ def _holder(lock: Path) -> str:
 
 def writer_of(session: Path) -> str:
     """Return the name of the process that writes a session; empty without a writer."""
-    lock = _place(session)
+    lock = session.with_name(session.name + ".lock")
     with suppress(OSError), lock.open("rb") as file:
         from filelock import FileLock, SoftFileLock, lock_descriptor  # noqa: PLC0415 - rare
 

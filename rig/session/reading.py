@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import sqlite3
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import datetime
 from itertools import chain
@@ -20,7 +20,7 @@ from rig.records import ClockSample, Drop, HostBreak, Job, Pulse
 from rig.session.drop_check import ByteReplay, check_drop
 from rig.session.faults import translate_errors
 from rig.session.foreign import limit_steps
-from rig.session.rows import RowError, check_row, drop_of, named_values
+from rig.session.rows import RowError, check_rows, drop_of, named_values
 from rig.session.schema import TABLES, Row, RunState, read_identity, read_reasons
 
 T = TypeVar("T")
@@ -32,7 +32,7 @@ UNBLINDED = "unblinded"
 """The only key of the metadata that may be added later."""
 MOST_EDGES = 1 << 22
 """Most edges of a drop without a certificate: no working timer gives more in an hour."""
-_AT_ONCE = 256
+_AT_ONCE = 1024
 """Rows fetched at once."""
 _AFTER = "WHERE id > ? ORDER BY id"
 """SQL for the rows after a given number: rows are never deleted, so numbers have no gaps."""
@@ -147,8 +147,7 @@ class Reader:
 
     def identities(self) -> list[tuple[int, dict[str, Any]]]:
         """Return host time and content of every identity record, in order."""
-        rows = self._rows("identity", "ORDER BY id")
-        return [(host_ns, read_identity(text)) for _, host_ns, text in rows]
+        return [(ns, read_identity(text)) for _, ns, text in self._rows("identity", "ORDER BY id")]
 
     def byte_log(self, after: int = 0) -> Iterator[ByteChunk]:
         """Return all chunks of bytes in order, without the first `after`.
@@ -230,7 +229,9 @@ class Reader:
 
     def _raw(self, table: str, which: str, *values: object) -> Iterator[Row]:
         """Return rows unchecked; `table` and `which` are constants of this module."""
+        return chain.from_iterable(self._batches(table, which, *values))
 
+    def _batches(self, table: str, which: str, *values: object) -> Iterator[list[Row]]:
         def fetch() -> list[Row]:
             with translate_errors(self.path):
                 return cursor.fetchmany(_AT_ONCE)
@@ -241,7 +242,7 @@ class Reader:
             cursor = self.connection.execute(f'SELECT * FROM "{table}" {which}', values)  # noqa: S608
         # Not a generator: Python closes an unfinished generator by itself, and a Ctrl-C during
         # that is printed and lost.
-        return chain.from_iterable(iter(fetch, []))
+        return iter(fetch, [])
 
     def _rows(self, table: str, which: str = "", *values: object) -> Iterator[Row]:
         """Return rows, each checked.
@@ -254,18 +255,18 @@ class Reader:
         # A file of an older format that is open read-only may lack tables.
         if TABLES[table].since > 1 and not any(self._raw("sqlite_master", "WHERE name = ?", table)):
             return
-        for row in self._raw(table, which, *values):
-            self._check(table, row)
-            yield row
+        for rows in self._batches(table, which, *values):
+            self._check(table, rows)
+            yield from rows
 
     def _records(
         self, kind: Callable[..., T], table: str, which: str, *args: object
     ) -> Iterator[T]:
         return (kind(*row[1:]) for row in self._rows(table, which, *args))
 
-    def _check(self, table: str, row: Row) -> None:
+    def _check(self, table: str, rows: Sequence[Row]) -> None:
         try:
-            check_row(table, row)
+            check_rows(table, rows)
         except RowError as error:
             raise self._damage(str(error)) from error
 
@@ -276,9 +277,9 @@ class Reader:
         return row
 
     def _drop(self, row: Row, replayed: Mapping[Job, Drop]) -> Drop:
-        self._check("drop", row[:3])  # without these the drop is unknown
+        self._check("drop", [row[:3]])  # without these the drop is unknown
         try:
-            check_row("drop", row)
+            check_rows("drop", [row])
             stored = drop_of(row, self._edges(row))
             if check_drop(stored, replayed).whole:
                 return stored
@@ -292,12 +293,11 @@ class Reader:
         return rig_error("session_wrong", path=self.path, text=text)
 
     def _edges(self, row: Row) -> list[Row]:
-        number, events = row[0], named_values(row)["events"]
+        events = named_values(row)["events"]
         # An event is a change of one or more gates.
         most = MOST_EDGES if events is None else min(MOST_EDGES, GATES * events)
-        edges = [*self._raw("edge", 'WHERE "drop" = ? ORDER BY idx LIMIT ?', number, most + 1)]
-        for edge in edges:
-            check_row("edge", edge)
+        edges = [*self._raw("edge", 'WHERE "drop" = ? ORDER BY idx LIMIT ?', row[0], most + 1)]
+        check_rows("edge", edges)
         if len(edges) > most:
             raise RowError(f"it has more than {most} edges")
         return edges

@@ -6,9 +6,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from typing import Any
 
+import msgspec
+
 from rig.printable import encodable
 from rig.records import Certificate, Drop, Edge
-from rig.session.schema import TABLES, Record, read_reasons, write_reasons
+from rig.session.schema import TABLES, Record, Row, read_reasons, write_reasons
 
 _DROP = TABLES["drop"].names()
 _ACCOUNT = [field.name for field in fields(Certificate)]
@@ -22,30 +24,31 @@ class RowError(ValueError):
     """A row with an invalid value."""
 
 
-def check_row(table: str, row: Sequence[object]) -> None:
-    """Check every value of a row.
+def check_rows(table: str, rows: Sequence[Row]) -> None:
+    """Check every value of some rows.
 
     Parameters
     ----------
     table
         A name in `TABLES`.
-    row
-        Its columns, in order; a row of an older format has fewer.
+    rows
+        Of each its columns, in order; rows of an older format have fewer, all of them.
 
     Raises
     ------
     RowError
         A value is invalid; names value, place and accepted values.
     """
-    for column, value in zip(TABLES[table].columns, row, strict=False):
-        if not column.accepts(value):
-            at = row[0] if TABLES[table].key == 1 else row[: TABLES[table].key]
-            fault = f"{column.name} {value!r:.40} is not {column.accepted}"
+    for column, values in zip(TABLES[table].columns, zip(*rows, strict=True), strict=False):
+        if not column.kind.accepts(values):
+            for row in rows[:-1]:  # the first invalid row is named
+                check_rows(table, [row])
+            at = rows[-1][0] if TABLES[table].key == 1 else rows[-1][: TABLES[table].key]
+            fault = f"{column.name} {values[-1]!r:.40} is not {column.kind.accepted}"
             raise RowError(f"table {table}, row {at!r:.40}: {fault}")
-    if table == "drop":
-        values = named_values(row)
-        if len({values[name] is None for name in _CERTIFIED if name in values}) > 1:
-            raise RowError(f"table drop, row {row[0]}: half of its certificate is missing")
+    for drop in map(named_values, rows if table == "drop" else ()):
+        if len({drop[name] is None for name in _CERTIFIED if name in drop}) > 1:
+            raise RowError(f"table drop, row {drop['id']}: half of its certificate is missing")
 
 
 def named_values(row: Sequence[Any]) -> dict[str, Any]:
@@ -56,12 +59,13 @@ def named_values(row: Sequence[Any]) -> dict[str, Any]:
 def drop_of(row: Sequence[Any], edges: Iterable[Sequence[Any]]) -> Drop:
     """Return the drop of checked rows of the drop and its edges; damaged if edges are missing."""
     values, edges = named_values(row), [*edges]
-    torn = any(edge[1] != number for number, edge in enumerate(edges))
+    torn = [edge[1] for edge in edges] != [*range(len(edges))]
+    changes = [(tick, channel, blocked == 1) for _, _, tick, channel, blocked in edges]
     # Certificates of older formats lack some columns.
     account: dict[str, Any] = {name: values.get(name) for name in _ACCOUNT}
     return Drop(
         **{name: values[name] for name in _PLAIN},
-        edges=tuple(Edge(tick, channel, bool(blocked)) for _, _, tick, channel, blocked in edges),
+        edges=msgspec.convert(changes, tuple[Edge, ...]),
         certificate=None if values["events"] is None else Certificate(**account),
         faults=read_reasons(values["faults"]),
         damage="edges of it are missing" if torn else "",

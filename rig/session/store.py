@@ -199,8 +199,7 @@ class Session(Reader, AbstractContextManager["Session"]):
         self.rescued = True
         log.error("%s while it was in use; everything is saved as %s", trouble, place)
         except_for = f", but for {lost} records" if lost else ""
-        values = {"trouble": trouble, "place": place, "except_for": except_for}
-        return rig_error("session_rescued", **values)
+        return rig_error("session_rescued", trouble=trouble, place=place, except_for=except_for)
 
     def close(self) -> None:
         """Commit and close; further calls do nothing.

@@ -14,7 +14,7 @@ from rig.reasons import make_reason, plain_reason
 from rig.records import Certificate, ClockSample, Drop, Edge, HostBreak, Pulse
 from rig.recover.examine import examine
 from rig.recover.save import save
-from rig.session.hashes import protocol_first
+from rig.session.hashes import check_chain, protocol_first
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, TABLES, RunState
 from rig.session.store import Session
 from tests.refusals import refused
@@ -271,7 +271,7 @@ for count in range(10**9):
         stamps = [chunk.host_ns for chunk in session.byte_log()]
     # The row after the last announced one may have been committed before the kill.
     assert stamps in (list(range(last + 1)), list(range(last + 2)))
-    assert examine(path).rows.chain_faults() == []
+    assert check_chain(examine(path).rows.tables) == []
 
 
 def test_sigkill_before_the_commit_leaves_a_whole_session(path):
@@ -281,7 +281,7 @@ def test_sigkill_before_the_commit_leaves_a_whole_session(path):
     with Session.open(path) as session:
         assert list(session.byte_log()) == []
         session.log_bytes("rx", 1, b"goes on")
-    assert examine(path).rows.chain_faults() == []
+    assert check_chain(examine(path).rows.tables) == []
 
 
 def test_one_writer_even_within_a_process(path):
@@ -362,7 +362,7 @@ def sound(tmp_path_factory):
 
 
 def faults(path):
-    return examine(path).rows.chain_faults()
+    return check_chain(examine(path).rows.tables)
 
 
 def first(path):
