@@ -129,8 +129,8 @@ class Assembly:
         numbers = sorted(known.keys() & range(seen.events) if seen else known)
         # Behind a gap it is not known when the gates changed: no edge is better than a wrong one.
         before = [known.get(n - 1, known[n])[1] if n else state for n in numbers]
-        gates, events = (seen or self).gates, map(known.__getitem__, numbers)
-        return edges(events, before, gates, fire_tick)
+        events = map(known.__getitem__, numbers)
+        return edges(events, before, (seen or self).gates, fire_tick)
 
     def _faults(self, tick_hz: int) -> Iterator[Reason]:
         if not tick_hz:
