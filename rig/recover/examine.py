@@ -113,9 +113,8 @@ def _lines(session: ExaminedFile) -> list[str]:
     if snapshot.logged:
         lines.append(f"{snapshot.logged} pages are in the log beside it (-wal) only: keep both")
     world = {"true": "simulated", "false": "real"}.get(meta.get("simulated", ""), "unknown if real")
-    program = meta.get("rig_version", "of unknown version")
-    made = meta.get("created", "at an unknown time")
-    lines.append(f"a session made {made} by rig {program}, {world}")
+    made = {"created": "at an unknown time", "rig_version": "of unknown version"} | meta
+    lines.append(f"a session made {made['created']} by rig {made['rig_version']}, {world}")
     for table, name in _NUMBERED.items():
         if count := len(rows.tables[table]):
             missing = rows.gaps(table)
@@ -133,7 +132,8 @@ def _lines(session: ExaminedFile) -> list[str]:
     if session.whole:
         lines.append("everything is whole")
     states = rows.in_order("run_state")
-    if snapshot.logged is None and not snapshot.writer and (not states or states[-1][3] in _OPEN):
+    is_open = not states or (states[-1][3] in _OPEN and rows.tables["bytes"])  # or imported
+    if snapshot.logged is None and not snapshot.writer and is_open:
         lines.append(
             "its last run is open: if there was a file of this name with -wal behind it, "
             "put it back beside this one, since it holds what came last"
