@@ -119,6 +119,7 @@ class SignalReader:
         """Return the changes that rows say; a row may say that nothing changes, or be unread."""
         file, self.block, self.count = self.file, block, 0
         self.starts, self.states = dict[int, int](), dict[tuple[object, ...], str]()
+        self.words = dict[int, str]()
         self.changes, self.samples = list[Any](), [array("d") for _ in self.signals]
         signals = [*enumerate(self.signals)]
         for row in rows:
@@ -172,12 +173,16 @@ class SignalReader:
         word, tick = row.cell(value.at), ticks[clock.at]
         if tick is None or not (word or self.is_sampled or value.role == "moment"):
             return False
+        if self.words.get(n) == word:  # in nearly all rows of levels
+            return True
         state = meaning_of(value.role, value.words.get(word, word) or value.state)
         if value.role == "volts" and is_number(word):
             self.samples[n].extend((row.line, tick - self.starts[clock.at], float(word)))
         elif state is None:
             self._reject(row, value, word)
         elif state or not self.is_sampled:
+            if self.is_whole and not self.places:
+                self.words[n] = word
             key = n, *self.above.values()
             before, self.states[key] = self.states.get(key), state
             if not self.is_whole or before != state:
