@@ -119,7 +119,7 @@ class SignalReader:
         """Return the changes that rows say; a row may say that nothing changes, or be unread."""
         file, self.block, self.count = self.file, block, 0
         self.starts, self.states = dict[int, int](), dict[tuple[object, ...], str]()
-        self.words = dict[int, str]()
+        self.words, self.times = dict[int, str](), array("q")
         self.changes, self.samples = list[Any](), [array("d") for _ in self.signals]
         signals = [*enumerate(self.signals)]
         for row in rows:
@@ -128,6 +128,8 @@ class SignalReader:
                 # Of merged cells only the first has a text.
                 if (text := row.cell(column.at)) or column.filled > _SPARSE:
                     self.above[role] = text
+            if self.is_sampled and (tick := ticks[self.clocks[0].at]) is not None:
+                self.times.append(tick)
             read = {x.clock.at for n, x in signals if self._read_value(n, row, ticks)}
             timed = {at for at, tick in ticks.items() if tick is not None}
             if not read or read != timed or any(row.texts[self.width :]):
@@ -140,8 +142,8 @@ class SignalReader:
             if signal.value.role == "volts":
                 self._find_crossings(n)
         if self.is_sampled and 2 * len({change[0] for change in self.changes}) < self.count:
-            lasting = [self.latest[at] - start for at, start in self.starts.items()]
-            file.period = max(lasting, default=0) // max(1, self.count - 1)
+            # Between drops there may be pauses.
+            file.period = int(np.median(np.diff(self.times))) if len(self.times) > 1 else 0
         return np.array(self.changes, CHANGE)
 
     def _read_time(self, row: Row, clock: TimerColumn) -> int | None:
