@@ -119,17 +119,17 @@ class SignalReader:
         """Return the changes that rows say; a row may say that nothing changes, or be unread."""
         file, self.block, self.count = self.file, block, 0
         self.starts, self.states = dict[int, int](), dict[tuple[object, ...], str]()
-        self.words, self.times = dict[int, str](), array("q")
+        self.words, self.times = dict[int, str](), array("d")
         self.changes, self.samples = list[Any](), [array("d") for _ in self.signals]
-        signals = [*enumerate(self.signals)]
+        signals, first = [*enumerate(self.signals)], self.clocks[0].at
         for row in rows:
             ticks = {clock.at: self._read_time(row, clock) for clock in self.clocks}
             for role, column in self.places.items():
                 # Of merged cells only the first has a text.
                 if (text := row.cell(column.at)) or column.filled > _SPARSE:
                     self.above[role] = text
-            if self.is_sampled and (tick := ticks[self.clocks[0].at]) is not None:
-                self.times.append(tick)
+            if self.is_sampled and (tick := ticks[first]) is not None:
+                self.times.append(tick - self.starts[first])
             read = {x.clock.at for n, x in signals if self._read_value(n, row, ticks)}
             timed = {at for at, tick in ticks.items() if tick is not None}
             if not read or read != timed or any(row.texts[self.width :]):

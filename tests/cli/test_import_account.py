@@ -59,6 +59,17 @@ def test_what_is_said_of_a_fall(look, content, options, code, said):
     assert doubted == said.startswith("free fall gives g = 8")
 
 
+def test_samples_are_as_far_apart_as_most_of_them_at_any_date(look):
+    content, levels = "time (s),gate 0,gate 1,gate 2,gate 3\n", dict.fromkeys(range(4), 0)
+    for at, run in ((1764504000, RUNS[0]), (1764504005, RUNS[1])):
+        for n in range(1600):
+            levels |= {gate: int(dark) for when, gate, dark in run if when <= n * 5e-4}
+            content += f"{at + n * 5e-4:.4f},{','.join(map(str, levels.values()))}\n"
+    done = look(content)
+    assert "2 of 2 runs compared: 16 of 16 edges" in done.out + done.err
+    assert "sampled every 500 µs" in done.out + done.err
+
+
 def test_two_wires_at_one_stamp_of_a_dump_are_refused(look):
     first, second = (f"#{round(time * 1e6)}\n" for time, _, _ in FALL[1:3])
     content = shapes()["VCD"].content.decode()
