@@ -20,7 +20,7 @@ from rig.records import Drop
 from rig.text_rows import read_rows
 from rig.timers.edge_rows import make_drop
 from rig.timers.moments import TICK_HZ
-from rig.timers.timer_file import STATES, Records, TimerFile
+from rig.timers.timer_file import STATES, Records, TimerFile, record_type
 from rig.timers.vocabulary import POWERS, holds, number_of
 
 _LONGEST = 60 * TICK_HZ
@@ -33,9 +33,7 @@ _GOOD_GUESS = 0.95
 _MOST_MAPS = 200
 _FEWEST = 3
 """Changes of a drop that tell which gate it passed: two are near those of falls past several."""
-_EDGE = np.dtype(
-    [("run", "i8"), ("tick", "O"), ("channel", "i8"), ("blocked", "?"), ("line", "i4")]
-)
+_EDGE = record_type("run:i8 tick:O channel:i8 blocked:? line:i4")
 
 
 class FileLayout(NamedTuple):
