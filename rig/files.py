@@ -18,6 +18,11 @@ _DESCRIPTORS = ("/dev/", "/proc/")
 """Where a shell puts the pipe of ``<(...)`` or ``|``: somebody writes into it, and it ends."""
 
 
+def beside(path: Path, ending: str) -> Path:
+    """Return the place of a file beside another, whose name has a further ending."""
+    return path.with_name(path.name + ending)
+
+
 def require_file(path: str | os.PathLike[str], *, descriptors: bool = False) -> None:
     """Refuse what is no file: to open or to read it may never end.
 
@@ -147,7 +152,7 @@ def state_folder() -> Path:
 def file_stamp(path: Path) -> tuple[tuple[int, int, int], ...]:
     """Tell a session file, and what was written beside it, from what they were before."""
     stats = []
-    for file in (path, path.with_name(f"{path.name}-wal")):
+    for file in (path, beside(path, "-wal")):
         with suppress(OSError):
             stat = file.stat()
             stats.append((stat.st_ino, stat.st_mtime_ns, stat.st_size))

@@ -10,7 +10,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from rig.errors import InputError
-from rig.files import replacing, require_file
+from rig.files import beside, replacing, require_file
 from rig.reasons import rig_error
 from rig.session.faults import translate_errors
 from rig.session.foreign import check_schema
@@ -109,7 +109,7 @@ def copy_session(path: Path, folder: Path) -> Path:
         It cannot be read, or there is no room for it.
     """
     copy = folder / "copy"
-    log = path.with_name(path.name + "-wal")
+    log = beside(path, "-wal")
     shutil.copyfile(path, copy)
     if log.is_file() and log.stat().st_size:
         shutil.copyfile(log, folder / "copy-wal")
@@ -119,7 +119,7 @@ def copy_session(path: Path, folder: Path) -> Path:
 def _reading(path: Path) -> sqlite3.Connection:
     """Open a session read-only, without changes to its file and the files beside it."""
     # SQLite would merge the log of a dead writer into the file on close.
-    leftover = any(path.with_name(path.name + end).exists() for end in ("-wal", "-shm"))
+    leftover = any(beside(path, end).exists() for end in ("-wal", "-shm"))
     if leftover and not writer_of(path):
         memory = sqlite3.connect(":memory:", isolation_level=None)
         with TemporaryDirectory(prefix="rig-session-") as folder:
@@ -135,5 +135,5 @@ def _reading(path: Path) -> sqlite3.Connection:
         return open_database(path, "rw")
     # Without a log there is no writer: on a CD or a write-protected share the file may be read
     # as it is.
-    logged = path.with_name(path.name + "-wal").exists()
+    logged = beside(path, "-wal").exists()
     return open_database(path, "ro" if logged else "ro&immutable=1")

@@ -116,5 +116,6 @@ def _digest(before: bytes, table: str, rows: Iterable[Sequence[Any]]) -> bytes:
 
 
 def _strip(row: Sequence[Any]) -> list[Any]:
-    last = max((n for n, value in enumerate(row, 1) if value is not None), default=0)
-    return [*row[:last]]
+    while row and row[-1] is None:
+        row = row[:-1]
+    return [*row]

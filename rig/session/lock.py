@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from rig.errors import SessionError
+from rig.files import beside
 from rig.reasons import rig_error
 
 _POLL_S = 0.0025
@@ -34,7 +35,7 @@ class WriterLock:
     def __init__(self, session: Path) -> None:
         from filelock import FileLock, Timeout, has_fcntl  # noqa: PLC0415 - not for who only reads
 
-        self.path = session.with_name(session.name + ".lock")
+        self.path = beside(session, ".lock")
         self._lock = FileLock(
             self.path, _LOOK_S, thread_local=False, poll_interval=_POLL_S, fallback_to_soft=False
         )
@@ -76,7 +77,7 @@ def _holder(lock: Path) -> str:
 
 def writer_of(session: Path) -> str:
     """Return the name of the process that writes a session; empty without a writer."""
-    lock = session.with_name(session.name + ".lock")
+    lock = beside(session, ".lock")
     with suppress(OSError), lock.open("rb") as file:
         from filelock import FileLock, SoftFileLock, lock_descriptor  # noqa: PLC0415 - rare
 

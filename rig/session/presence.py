@@ -6,6 +6,8 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
+from rig.files import beside
+
 
 class Presence:
     """Identity and size of a session's file when it was opened.
@@ -20,7 +22,7 @@ class Presence:
     """
 
     def __init__(self, path: Path) -> None:
-        self._path, self._log = path, path.with_name(path.name + "-wal")
+        self._path, self._log = path, beside(path, "-wal")
         self._known = {file: _stat(file) for file in (path, self._log)}
 
     def remove_log(self) -> None:
@@ -32,7 +34,7 @@ class Presence:
         if known and now and os.path.samestat(known, now) and now.st_size == 0:
             with suppress(OSError):
                 self._log.unlink()
-                self._path.with_name(self._path.name + "-shm").unlink()
+                beside(self._path, "-shm").unlink()
 
     def trouble(self) -> str:
         """Return in words what happened to the file; empty if it is unchanged."""

@@ -209,9 +209,8 @@ class Session(Reader, AbstractContextManager["Session"]):
         SessionError
             The last commit fails; the file is closed nevertheless.
         """
-        if self._connection is None:
+        if (connection := self._connection) is None:
             return
-        connection = self._connection
         try:
             if not self.readonly and self._loss is None:
                 self.commit()
