@@ -53,6 +53,9 @@ def csv_text(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) -> st
 def _signs_aligned(column: Sequence[str]) -> list[str]:
     """Pad what is behind ``±`` so that the signs stand under each other, but for the heading's."""
     heading, *cells = column
-    parts = [cell.partition("±") for cell in cells]
-    behind = max((len(after) for *_, after in parts), default=0)
-    return [heading, *(part[0] + part[1] + part[2].ljust(behind * len(part[1])) for part in parts)]
+    behind = max((len(cell.partition("±")[2]) for cell in cells), default=0)
+    padded = []
+    for cell in cells:
+        before, sign, after = cell.partition("±")
+        padded.append(f"{before}±{after.ljust(behind)}" if sign else cell)
+    return [heading, *padded]

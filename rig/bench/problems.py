@@ -160,8 +160,10 @@ def beam_fit(band: float) -> WorkProblem:
             lambda p: _passages(beams, p)[0] - times,
             begin,
             lambda p: _passages(beams, p)[1],
+            xtol=tolerance,
+            ftol=tolerance,
+            gtol=tolerance,
             x_scale="jac",
-            **dict.fromkeys(("xtol", "ftol", "gtol"), tolerance),
         )
         return answer(run.x, run.nfev)
 
