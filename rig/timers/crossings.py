@@ -17,9 +17,6 @@ _CLEAR_SWING = 8.0
 _SCATTER = 1.4826
 """Standard deviation over the median of absolute deviations, of normal noise."""
 
-_FAR = 1e300
-"""Beyond any volts, where there are none."""
-
 
 def find_crossings(samples: Array) -> tuple[float | None, Array]:
     """Return the middle between two levels of volts, and where they cross it.
@@ -37,7 +34,9 @@ def find_crossings(samples: Array) -> tuple[float | None, Array]:
         Of each the line of the sample behind it, its moment, and 1 where volts rise.
     """
     lines, times, volts = samples.T
-    low, high = volts.min(initial=_FAR), volts.max(initial=-_FAR)
+    if not volts.size:
+        return None, samples[:0]
+    low, high = volts.min(), volts.max()
     for _ in range(10):  # two means, one for each level: of two levels, two or three are enough
         above = volts > 0.5 * (low + high)
         if above.all() or not above.any():
