@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -21,24 +21,19 @@ from rig.analysis.chain_records import ChainRecord, EdgeTrain
 from rig.analysis.components import ALPHA_SD, ANY_ALPHA
 from rig.analysis.departures import LOWEST_START
 from rig.analysis.free_flight import FAINT
-from rig.analysis.trajectory import (
-    COMMON,
-    GRAVITY,
-    ONE,
-    Trajectory,
-    free_trajectory,
-    struck_trajectory,
-)
-from rig.analysis.unknowns import ANY_GRAVITY, prior_air
+from rig.analysis.unknowns import prior_air
 from rig.arrays import Array, Index
-from rig.protocol.protocol import Protocol
+
+if TYPE_CHECKING:
+    from rig.analysis.drop_model import DropModel
+    from rig.analysis.trajectory import Trajectory
 
 MISSED = 0.02
 """Prior probability that an expected edge is missed."""
 STRAYS = 2.0
 """Prior rate of stray edges at a gate, 1/s."""
-RELEASE, START, CLOCK, PULL, DRAG, ALPHA, UNKNOWNS = range(7)
-"""Columns of a fall's unknowns: release time, start height, clock rate, g, κ, α; their number."""
+RELEASE, START, CLOCK, PULL, DRAG, ALPHA = range(6)
+"""Columns of a fall's unknowns: release time, start height, clock rate, g, κ, α of all impacts."""
 PART = 6.0
 """Least spacing of two rods over σ of the first step: narrow enough to resolve neighbours."""
 _BROADER = 2.0
@@ -242,9 +237,8 @@ class FallFit(NamedTuple):
 
     Attributes
     ----------
-    values
-        The fall's unknowns, shape ``(UNKNOWNS,)``: release, s since it fired; start, m; rate by
-        which the edges' clock is slow; g, m/s²; κ, 1/m; α of all impacts.
+    x
+        The drop's unknowns by this side alone, shape ``(unknowns,)``.
     match
         Observed edge of every expected edge, −1 if missed.
     evidence
@@ -253,7 +247,7 @@ class FallFit(NamedTuple):
         Root mean square of the edges' residuals, in σ.
     """
 
-    values: Array
+    x: Array
     match: Index
     evidence: float
     scatter: float
@@ -271,54 +265,49 @@ class FallFit(NamedTuple):
 
 @dataclass(frozen=True)
 class SideFall:
-    """Model of a chain's fall with few unknowns, for annealing.
+    """A side of a drop with the few unknowns that move its chain as a whole, for annealing.
 
-    A fall is an array of the unknowns in units of their prior uncertainties, as deviations from the
-    stated values; many falls have the shape ``(falls, UNKNOWNS)``.
+    A fall is an array of these in units of their prior uncertainties, as deviations from the stated
+    values; many falls have the shape ``(falls, columns)``.
 
     Attributes
     ----------
-    record, pairing
-        The chain, and the edges of its trains.
-    stated
-        The unknowns' values by the protocol, shape ``(UNKNOWNS,)``.
-    sd
-        Prior standard uncertainty of each unknown, shape ``(UNKNOWNS,)``; 0 if known exactly, and
-        1 s for the release, which has no prior.
-    sigma
-        Standard deviation of each expected edge from all other errors, m; not needed for votes.
+    model, role
+        The drop, and the side.
     """
 
-    record: ChainRecord
-    pairing: Pairing
-    stated: Array
-    sd: Array
-    sigma: Array
+    model: DropModel
+    role: str
 
-    @classmethod
-    def of(
-        cls,
-        protocol: Protocol,
-        record: ChainRecord,
-        pairing: Pairing,
-        clock_u: float,
-        sigma: Array = ONE,
-    ) -> SideFall:
-        """Return the model of a side with the protocol's values and priors."""
-        stated, sd = np.zeros(UNKNOWNS), np.zeros(UNKNOWNS)
-        stated[START], stated[PULL] = protocol.drop.value, protocol.gravity.value
-        stated[ALPHA], (stated[DRAG], sd[DRAG]) = record.alpha, prior_air(protocol)
-        sd[RELEASE], sd[START] = 1.0, math.hypot(protocol.drop.u, protocol.priors.hang)
-        sd[CLOCK] = clock_u
-        sd[PULL] = ANY_GRAVITY if protocol.surface is None else protocol.gravity.u
-        if record.ratios is not None:
-            sd[ALPHA] = ALPHA_SD
-        return cls(record, pairing, stated, sd, sigma)
+    @property
+    def record(self) -> ChainRecord:
+        """The chain, with its edges."""
+        return self.model.records[self.role]
+
+    @property
+    def pairing(self) -> Pairing:
+        """The edges of its trains."""
+        return self.model.pairings[self.role]
+
+    @cached_property
+    def columns(self) -> Index:
+        """Places of its unknowns in the drop's vector, as `RELEASE` and the others say."""
+        names = [f"{self.role} release", "drop", "clock", "gravity", "drag"]
+        names += ["alpha"] * (self.record.ratios is not None)
+        return np.array([self.model.unknowns[name].start for name in names])
+
+    @cached_property
+    def sd(self) -> Array:
+        """Prior standard uncertainty of each unknown; 1 s for the release, which has no prior."""
+        sd = self.model.unknowns.sd[self.columns]
+        sd[START] = math.hypot(sd[START], self.model.components.hang)
+        sd[ALPHA:] = ALPHA_SD
+        return sd
 
     @cached_property
     def levels(self) -> Array:
         """Level of every expected edge, m."""
-        return np.concatenate([train.levels for train in self.record.trains])
+        return self.model.expected[self.role].levels
 
     @cached_property
     def slack(self) -> float:
@@ -326,42 +315,40 @@ class SideFall:
         return self.record.pitch / PART
 
     @cached_property
+    def sigma(self) -> Array:
+        """Standard deviation of each expected edge in the last step, m.
+
+        All unknowns that move levels count as scatter.
+        """
+        scales, levels = self.model.components, self.model.slopes[self.role].levels
+        own = np.hypot(scales.floor, scales.departure * (self.record.ratios is not None))
+        variance = own**2 + levels**2 @ self.model.unknowns.sd**2
+        return np.asarray(np.minimum(_BROADER * np.sqrt(variance), self.slack))
+
+    @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds of the unknowns: drag and gravity stay positive."""
-        low, high = np.full(UNKNOWNS, -np.inf), np.full(UNKNOWNS, np.inf)
-        low[START] = LOWEST_START - self.stated[START]
-        low[PULL] = -0.9 * self.stated[PULL]
-        low[DRAG] = FAINT - self.stated[DRAG]  # below FAINT, formulas without drag apply
-        low[ALPHA], high[ALPHA] = ANY_ALPHA - np.clip(self.stated[ALPHA], *ANY_ALPHA)
+        protocol, size = self.model.protocol, self.columns.size
+        low, high = np.full(size, -np.inf), np.full(size, np.inf)
+        low[START] = LOWEST_START - protocol.drop.value
+        low[PULL] = -0.9 * protocol.gravity.value
+        low[DRAG] = FAINT - prior_air(protocol)[0]  # below FAINT, formulas without drag apply
+        low[ALPHA:], high[ALPHA:] = ANY_ALPHA - np.clip(self.record.alpha, *ANY_ALPHA)
         exact = self.sd == 0.0
         unit = np.where(exact, 1.0, self.sd)
         return np.where(exact, -np.inf, low / unit), np.where(exact, np.inf, high / unit)
 
-    @cached_property
-    def _by(self) -> Array:
-        """Derivatives of a trajectory's parameters by the unknowns, without those of time."""
-        rods = 0 if self.record.ratios is None else self.record.ratios.size
-        by = np.zeros((COMMON + 2 * rods, UNKNOWNS))
-        by[[1, GRAVITY, 3], [START, PULL, DRAG]] = 1.0
-        by[COMMON : COMMON + rods, ALPHA] = 1.0
-        return by * self.sd
-
-    def values(self, falls: Array) -> Array:
-        """Return the unknowns' values in SI units, shaped like `falls`."""
-        values: Array = self.stated + falls * self.sd
-        return values
+    def unknowns(self, falls: Array) -> Array:
+        """Return the drop's unknowns for falls released at time zero, shape ``(…, unknowns)``."""
+        x = np.zeros((*falls.shape[:-1], len(self.model.unknowns)))
+        x[..., self.columns] = falls * self.sd
+        x[..., self.columns[RELEASE]] = 0.0
+        x[..., self.columns[ALPHA:]] += self.record.alpha
+        return x
 
     def path(self, falls: Array) -> Trajectory:
         """Return the trajectories of falls released at time zero."""
-        record = self.record
-        _, start, _, gravity, kappa, alpha = self.values(falls).T[..., None]
-        if record.ratios is None:
-            return free_trajectory(0.0, start, gravity, kappa, record.air)
-        strikes = record.strikes
-        gains = alpha + np.zeros(strikes.size)
-        return struck_trajectory(
-            0.0, start, gravity, gains, record.ratios, strikes, kappa, record.air
-        )
+        return self.model.trajectory(self.role, self.unknowns(falls))
 
     def since(self, falls: Array, times: Array) -> Array:
         """Return the true time since the release for stamped times, s.
@@ -372,18 +359,23 @@ class SideFall:
         rate: Array = 1.0 + falls[:, CLOCK, None] * self.sd[CLOCK]
         return (times - falls[:, RELEASE, None]) * rate
 
-    def sights(self, falls: Array) -> tuple[Array, Array, Array]:
-        """Return heights and speeds at each edge, and derivatives by all unknowns.
+    def sights(self, falls: Array, since: Array) -> tuple[Array, Array, Array]:
+        """Return heights and speeds, and derivatives of heights by all unknowns of a fall.
+
+        Parameters
+        ----------
+        since
+            True times since the release, s, shape ``(falls, times)``.
 
         Returns
         -------
         ndarray, ndarray, ndarray
-            m, m/s; shape ``(falls, edges)``, and ``(falls, edges, UNKNOWNS)``.
+            m, m/s; shape ``(falls, times)``, and ``(falls, times, columns)``.
         """
-        since = self.since(falls, self.pairing.times)
-        height, speed, slopes = self.path(falls).sights(since, self._by)
+        by = self.model.slopes[self.role].path[:, self.columns] * self.sd
+        height, speed, slopes = self.path(falls).sights(since, by)
         # The clock's rate may be taken as 1 in these derivatives.
-        slopes[..., RELEASE], slopes[..., CLOCK] = speed, -speed * since * self.sd[CLOCK]
+        slopes[..., CLOCK] = -speed * since * self.sd[CLOCK]
         return height, speed, slopes
 
     def anneal(self, falls: Array, close: float = np.inf) -> list[FallFit]:
@@ -396,12 +388,13 @@ class SideFall:
         close
             Log odds behind the best fall beyond which a fall is dropped.
         """
-        own, (low, high) = np.minimum(_BROADER * self.sigma, self.slack), self.bounds
-        prior = np.diag(np.where(np.arange(UNKNOWNS) == RELEASE, 1e-9, 1.0))
+        own, (low, high) = self.sigma, self.bounds
+        prior = np.diag(np.where(np.arange(self.columns.size) == RELEASE, 1e-9, 1.0))
         y = np.clip(falls, low, high)
         for step in range(_STEPS):
             width = np.maximum(own, self.slack * 0.5**step)
-            height, speed, slopes = self.sights(y)
+            since = self.since(y, self.pairing.times)
+            height, speed, slopes = self.sights(y, since)
             weights = self.pairing.weights(self.levels, height, speed, width)
             part, taken = weights.weight / weights.sigma**2, weights.weight.sum(axis=2)
             across = np.swapaxes(slopes, 1, 2)
@@ -435,13 +428,13 @@ class SideFall:
         """Match a fall's edges one to one, and compute its evidence."""
         edges = self.pairing.chosen(weights, speed)
         sides = np.flatnonzero(edges >= 0)
-        sigma = np.minimum(_BROADER * self.sigma, self.slack)[sides]
+        sigma = self.sigma[sides]
         off = height[edges[sides]] - self.levels[sides]
         evidence = float(log_density(off, sigma, speed[edges[sides]]).sum() - lost)
         scatter = math.sqrt(float(((off / sigma) ** 2).sum()) / max(1, sides.size))
-        values = self.values(fall)
-        values[RELEASE] *= 1.0 + values[CLOCK]
-        return FallFit(values, edges, evidence if math.isfinite(evidence) else -math.inf, scatter)
+        x = self.unknowns(fall)
+        x[self.columns[RELEASE]] = fall[RELEASE] * (1.0 + x[self.columns[CLOCK]])
+        return FallFit(x, edges, evidence if math.isfinite(evidence) else -math.inf, scatter)
 
     def nodes(self) -> Array:
         """Return the grid of starting points, the likeliest first.
@@ -450,15 +443,13 @@ class SideFall:
         σ of a grid point.
         """
         low, high = self.bounds
-        stated = np.clip(np.zeros((1, UNKNOWNS)), low, high)
-        path = self.path(stated)
-        times = path.times(self.levels)[0]
-        _, begin, slopes = (part[0] for part in path.sights(times, self._by))
-        slopes[:, CLOCK] = -begin * times * self.sd[CLOCK]
+        stated = np.clip(np.zeros((1, self.columns.size)), low, high)
+        times = self.path(stated).times(self.levels)
+        _, begin, slopes = (part[0] for part in self.sights(stated, times))
         slopes -= np.outer(begin, begin @ slopes) / max(float(begin @ begin), 1e-12)
         effects = np.abs(slopes).max(axis=0, initial=0.0) / (2.0 * self.slack)
         grid = stated
-        for name in (START, CLOCK, PULL, DRAG, ALPHA):
+        for name in range(START, self.columns.size):
             if steps := int(_FAR * effects[name] + 0.5):
                 axis = np.arange(-steps, steps + 1) / max(effects[name], steps / _FAR)
                 grid = np.repeat(grid, axis.size, axis=0)
@@ -550,7 +541,7 @@ class SideFall:
             middle = at + np.maximum(np.array(ends) - 1, 0) // 2
             peak[:, RELEASE] = begin + step * (middle + 0.5)
             table[row[:, None], np.clip(middle[:, None] + near, 0, bins)] = 0
-        return falls.reshape(-1, UNKNOWNS), np.concatenate(counts)
+        return falls.reshape(-1, self.columns.size), np.concatenate(counts)
 
     def _unlike(self, falls: Array) -> list[int]:
         """Return the first falls whose assignment of edges differs from that of all before."""
@@ -573,6 +564,6 @@ def _solve_bounded(matrix: Array, gradient: Array, low: Array, high: Array) -> A
         fixed = np.where(held, np.clip(change, low, high), 0.0)
         gradient = np.where(held, fixed, gradient - (matrix @ fixed[..., None])[..., 0])
         free = ~held[:, :, None] & ~held[:, None, :]
-        matrix = np.where(free, matrix, np.eye(UNKNOWNS))
+        matrix = np.where(free, matrix, np.eye(low.shape[-1]))
         change = np.linalg.solve(matrix, gradient[..., None])[..., 0]
     return np.asarray(change)

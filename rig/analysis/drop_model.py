@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.analysis import annealing
-from rig.analysis.annealing import PART, Pairing, SideFall, matched
+from rig.analysis.annealing import PART, Pairing, matched
 from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import ALPHA_SD, ANY_ALPHA, SHARPEST, Components, priors
 from rig.analysis.departures import LOWEST_START, Discrepancy
@@ -144,14 +143,6 @@ class DropModel:
             for role, record in self.records.items()
         }
 
-    def side(self, role: str) -> SideFall:
-        """Return a side for annealing; all other unknowns count as scatter of its edges."""
-        record, scales = self.records[role], self.components
-        sd = np.hypot(scales.floor, scales.departure if record.ratios is not None else 0.0)
-        variance = sd**2 + (self.slopes[role].levels ** 2) @ self.unknowns.sd**2
-        about = self.protocol, record, self.pairings[role], self.clock_u
-        return SideFall.of(*about, np.sqrt(variance))
-
     def under(self, protocol: Protocol) -> DropModel:
         """Return a copy with the priors of a protocol that differs in nothing else."""
         # Heights stay: they may be relative to a contact point of this drop alone.
@@ -191,19 +182,6 @@ class DropModel:
             x[self.unknowns[f"{role} release"]] = release
         if "impact" in releases:
             x[self.unknowns["alpha"]] = alpha
-        return x
-
-    def from_falls(self, falls: Mapping[str, Array]) -> Array:
-        """Return the unknowns for annealed falls by role, see `rig.analysis.annealing.FallFit`."""
-        releases = {role: fall[annealing.RELEASE] for role, fall in falls.items()}
-        values, at = np.array([*falls.values()]), self.unknowns
-        x = self.released(releases, values[0, annealing.ALPHA])
-        # The mean of both sides: each chain's own start height deviation begins at zero.
-        x[at["drop"]] = values[:, annealing.START].mean() - self.protocol.drop.value
-        x[at["clock"]] = values[:, annealing.CLOCK].mean()
-        if self.protocol.surface is None:
-            x[at["gravity"]] = values[0, annealing.PULL] - self.protocol.gravity.value
-        x[at["drag"]] = values[:, annealing.DRAG].max() - self._kappa
         return x
 
     def rate(self, x: Array) -> Array:

@@ -16,22 +16,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from rig.analysis.annealing import (
-    ALPHA,
-    LEAST,
-    MISSED,
-    PEAKS,
-    RELEASE,
-    FallFit,
-    Pairing,
-    SideFall,
-    log_density,
-)
+from rig.analysis.annealing import LEAST, MISSED, PEAKS, FallFit, SideFall, log_density
 from rig.analysis.chain_records import SIDES, ChainRecord
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY
 from rig.analysis.fit import Begun, DropFit, Fit, approach, settle
-from rig.arrays import Index
+from rig.arrays import Array, Index
 from rig.clock.calibration import TimeScale
 from rig.protocol.gates import CLEARANCE_M
 from rig.protocol.protocol import Protocol
@@ -151,7 +141,7 @@ def identify(
         Greatest number of batches of starts, the likeliest first; all if not given.
     """
     model = DropModel.of(protocol, records, clock_u)
-    readings = {role: _read(model.side(role), earliest, batches) for role in model.records}
+    readings = {role: _read(SideFall(model, role), earliest, batches) for role in model.records}
     # Evidence is relative to all edges being strays and every rod missed.
     if all(side and side[0].evidence > 0.0 for side in readings.values()):
         return _together(model, readings)
@@ -187,7 +177,7 @@ def few_edges(shares: Mapping[str, float], words: Vocabulary) -> dict[str, Reaso
 
 def side_fall(protocol: Protocol, record: ChainRecord, clock_u: float) -> SideFall:
     """Return a side whose edges are to be counted that agree on a fall near the stated values."""
-    return SideFall.of(protocol, record, Pairing.of(record.trains, record.top_shadow), clock_u)
+    return SideFall(DropModel.of(protocol, [record], clock_u), record.role)
 
 
 def well_read(fit: Fit) -> bool:
@@ -271,14 +261,13 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[FallFit]]) -> Id
     """Return the likeliest pair of both sides' readings with its odds; rivals are fitted first."""
 
     def likely(pair: Sequence[FallFit]) -> float:
-        together = _simultaneous(model.protocol, [side.values[RELEASE] for side in pair])
-        return sum(side.evidence for side in pair) + together
+        return sum(side.evidence for side in pair) + _simultaneous(model, _merge(model, pair))
 
     pairs = sorted(itertools.product(*readings.values()), key=likely, reverse=True)
     likeliest = likely(pairs[0])
     close = [pair for pair in pairs if likeliest - likely(pair) < _CLOSE][:PEAKS]
     further = likeliest - likely(pairs[len(close)]) if len(pairs) > len(close) else math.inf
-    drops = [_begin(model, dict(zip(readings, pair, strict=True))) for pair in close]
+    drops = [_begin(model, pair) for pair in close]
     best, evidence, odds, other = drops[0], likeliest, further, None
     if len(drops) > 1:
         tried = [weigh(settle(approach(drop.model, drop.x, drop.matches))) for drop in drops]
@@ -289,27 +278,32 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[FallFit]]) -> Id
     return Identification(best if evidence > 0.0 else None, best.shares, odds, other)
 
 
-def _begin(model: DropModel, sides: Mapping[str, FallFit]) -> DropFit:
+def _begin(model: DropModel, pair: Sequence[FallFit]) -> DropFit:
     """Return a drop with the matches and unknowns of annealed falls."""
-    x = model.from_falls({role: side.values for role, side in sides.items()})
-    alpha = sides["impact"].values[ALPHA] if "impact" in sides else 0.0
-    matches = {role: side.match for role, side in sides.items()}
+    x = _merge(model, pair)
+    alpha = float(x[model.unknowns["alpha"]][0]) if "impact" in model.records else 0.0
+    matches = {role: side.match for role, side in zip(model.records, pair, strict=True)}
     return DropFit(model.copy_with(alpha=alpha), matches, x)
+
+
+def _merge(model: DropModel, pair: Sequence[FallFit]) -> Array:
+    """Return the unknowns of a drop: of what both sides have the mean, the rest of either."""
+    x: Array = np.sum([side.x for side in pair], axis=0)
+    for name in ("drop", "clock", "gravity", "drag"):
+        x[model.unknowns[name]] /= len(pair)
+    return x
 
 
 def weigh(fit: Fit) -> Reading:
     """Return a fit of all sides with its evidence."""
-    paths = [fit.model.trajectory(role, fit.x) for role in fit.model.records]
-    evidence = log_evidence(fit) + _simultaneous(
-        fit.model.protocol, [float(path.time[0]) for path in paths]
-    )
+    evidence = log_evidence(fit) + _simultaneous(fit.model, fit.x)
     return Reading(fit, evidence if math.isfinite(evidence) else -math.inf)
 
 
-def _simultaneous(protocol: Protocol, releases: Sequence[float]) -> float:
+def _simultaneous(model: DropModel, x: Array) -> float:
     """Return the log prior of the release skew: a Cauchy density as wide as the accepted skew."""
-    apart = (max(releases) - min(releases)) / protocol.accept.release_skew
-    return -math.log1p(apart**2)
+    skew = np.ptp([x[model.unknowns[f"{role} release"]] for role in model.records])
+    return -math.log1p(float(skew / model.protocol.accept.release_skew) ** 2)
 
 
 def deciding_gate(likelier: DropFit, rival: DropFit) -> tuple[str, float]:
