@@ -10,14 +10,14 @@ the points of a grid of the unknowns at which most edges agree, the likeliest fi
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.chain_records import ChainRecord, EdgeTrain
+from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import ALPHA_SD, ANY_ALPHA
 from rig.analysis.departures import LOWEST_START
 from rig.analysis.free_flight import FAINT
@@ -98,58 +98,32 @@ class Weights(NamedTuple):
     weight: Array
 
 
-@dataclass(frozen=True)
 class Pairing:
     """The observed and expected edges of one side, prepared for repeated matching.
 
     Attributes
     ----------
-    times, burst
-        Time and burst of every observed edge, see `rig.analysis.chain_records.EdgeTrain`.
-    kind
-        Kind of each: twice the number of its train, plus 1 if it darkens the beam.
+    record
+        The chain, with its edges.
+    kind, kinds
+        Kind of every observed and of every expected edge: twice the number of its gate, plus 1 if
+        it darkens the beam.
     lasting
-        Duration of the shadow that each is an end of, s; 0 if it is of none.
-    kinds
-        Kind of every expected edge.
+        Duration of the shadow that each observed edge is an end of, s; 0 if it is of none.
     longest
         Length of the longest shadow that every expected edge may be an end of, m.
     """
 
-    times: Array
-    burst: Array
-    kind: Index
-    lasting: Array
-    kinds: Index
-    longest: Array
-
-    @classmethod
-    def of(cls, trains: Sequence[EdgeTrain], top_shadow: float = math.inf) -> Pairing:
-        """Return the pairing of a side's trains.
-
-        Parameters
-        ----------
-        top_shadow
-            Length of the longest shadow that belongs to the top rod, m.
-        """
-        none = np.zeros(0, dtype=np.intp)
-        rods, kind, kinds = (
-            np.concatenate([none, *values])
-            for values in (
-                [train.rods for train in trains],
-                [2 * n + train.blocked for n, train in enumerate(trains)],
-                [2 * n + train.blocks for n, train in enumerate(trains)],
-            )
-        )
-        times, burst = (
-            np.concatenate([np.zeros(0), *values])
-            for values in ([train.times for train in trains], [train.burst for train in trains])
-        )
-        lasting = np.zeros(times.size)
-        begins = np.flatnonzero((kind[1:] == kind[:-1] - 1) & (kind[:-1] % 2 > 0))
-        lasting[begins] = lasting[begins + 1] = times[begins + 1] - times[begins]
-        longest = np.where(rods == rods.max(initial=0), top_shadow, math.inf)
-        return cls(times, burst, kind, lasting, kinds, longest)
+    def __init__(self, record: ChainRecord) -> None:
+        edges, passages = record.edges, record.passages
+        self.record = record
+        self.kind: Index = 2 * edges.gate + edges.blocked
+        self.kinds: Index = 2 * passages.gate + passages.blocks
+        self.lasting: Array = np.zeros(edges.times.size)
+        begins = np.flatnonzero(edges.blocked[:-1] & (np.diff(self.kind) == -1))
+        self.lasting[begins] = self.lasting[begins + 1] = np.diff(edges.times)[begins]
+        is_top = passages.rods == passages.rods.max(initial=0)
+        self.longest: Array = np.where(is_top, record.top_shadow, math.inf)
 
     @cached_property
     def pairs(self) -> tuple[Index, Index]:
@@ -215,7 +189,7 @@ class Pairing:
         Parameters
         ----------
         levels
-            The height of the reference point at every expected edge of all trains, m.
+            The height of the reference point at every expected edge, m.
         heights, speeds
             Height and speed of the chain at each observed edge, by the current fit.
         scale
@@ -227,7 +201,7 @@ class Pairing:
         ndarray
             The observed edge for every expected edge, −1 if missed; shape ``(expected,)``.
         """
-        if not levels.size or not self.times.size:
+        if not levels.size or not self.kind.size:
             return np.full(levels.size, -1)
         return self.chosen(self.weights(levels, heights, speeds, scale), speeds)
 
@@ -286,7 +260,7 @@ class SideFall:
 
     @property
     def pairing(self) -> Pairing:
-        """The edges of its trains."""
+        """Its edges, prepared for matching."""
         return self.model.pairings[self.role]
 
     @cached_property
@@ -393,7 +367,7 @@ class SideFall:
         y = np.clip(falls, low, high)
         for step in range(_STEPS):
             width = np.maximum(own, self.slack * 0.5**step)
-            since = self.since(y, self.pairing.times)
+            since = self.since(y, self.record.edges.times)
             height, speed, slopes = self.sights(y, since)
             weights = self.pairing.weights(self.levels, height, speed, width)
             part, taken = weights.weight / weights.sigma**2, weights.weight.sum(axis=2)
@@ -492,7 +466,7 @@ class SideFall:
         """Return how many edges agree, each with a side of its own, with the fall of most votes."""
         falls, votes = self._count_votes(self.nodes()[:_BATCH])
         fall, (edge, side) = falls[np.argsort(-votes)[:1]], self.pairing.pairs
-        heights = self.path(fall).heights(self.since(fall, self.pairing.times))[0]
+        heights = self.path(fall).heights(self.since(fall, self.record.edges.times))[0]
         near = (np.abs(heights[:, edge] - self.levels[side]) <= self.slack).any(axis=0)
         return min(np.unique(edge[near]).size, np.unique(side[near]).size)
 
@@ -506,7 +480,7 @@ class SideFall:
         """
         path, rate = self.path(nodes), 1.0 + nodes[:, CLOCK, None] * self.sd[CLOCK]
         late, early = (path.times(self.levels + off) / rate for off in (-self.slack, self.slack))
-        times, lasts = np.sort(self.pairing.times), (late - early)[late > early]
+        times, lasts = np.sort(self.record.edges.times), (late - early)[late > early]
         if not times.size or not lasts.size:
             return nodes[:0], np.zeros(0, dtype=np.intp)
         # A record may last hours: search the window with most edges.
@@ -519,7 +493,7 @@ class SideFall:
         # Two bins for each vote at the fastest passage.
         step = float(lasts.min()) / 2.0
         bins = int((end - begin) / step) + 2
-        came = np.rint(np.clip((self.pairing.times - begin) / step, -1e9, 1e9)).astype(np.intp)
+        came = np.rint(np.clip((self.record.edges.times - begin) / step, -1e9, 1e9)).astype(np.intp)
         edge, side = self.pairing.pairs
         votes = np.zeros(len(nodes) * (bins + 1), dtype=np.intp)
         for lasted, sign in ((late, 1), (early, -1)):
@@ -546,7 +520,7 @@ class SideFall:
     def _unlike(self, falls: Array) -> list[int]:
         """Return the first falls whose assignment of edges differs from that of all before."""
         chosen: list[int] = []
-        height, speed = self.path(falls).heights(self.since(falls, self.pairing.times))
+        height, speed = self.path(falls).heights(self.since(falls, self.record.edges.times))
         side, _, _, weight = self.pairing.weights(self.levels, height, speed, self.slack)
         rods = np.where(weight > 0.5, side, -1).max(axis=2)
         for n, sides in enumerate(rods):

@@ -1,6 +1,6 @@
-"""A drop's edges as times: a train for each gate, a record for each chain.
+"""A drop's edges as times, in a record for each chain.
 
-Beside the observed edges of a gate stand the expected ones: all rods' sides that pass the beam
+Beside the observed edges of its gates stand the expected ones: all rods' sides that pass a beam
 before the rod strikes the surface, or rods that lie on it.
 """
 
@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,68 +44,63 @@ WIDER = 1.2
 half a radius off its middle, the chord is 13 % shorter."""
 
 
-@dataclass(frozen=True, slots=True)
-class EdgeTrain:
-    """Observed and expected edges of a gate.
+class ObservedEdges(NamedTuple):
+    """Observed edges, one gate after the other, shape ``(edges,)`` each.
 
     Attributes
     ----------
-    gate
-        Number of the gate in the protocol's list.
     times, blocked
-        Each edge: seconds since the release fired, and the state after it; shape ``(edges,)``.
+        Each edge: seconds since the release fired, and the state after it.
     burst
         Duration of the flicker that each edge is part of, s; 0 for a clean edge.
-    edge
-        Number of each edge in the drop's own list, shape ``(edges,)``.
-    rods, blocks
-        Each expected edge in order of time: which rod, and whether it darkens the beam; shape
-        ``(expected,)``.
-    levels
-        Height of the chain's reference point at each expected edge by the nominal geometry, m;
-        falling.
-    thinned
-        Number of observed edges left out, from the middle of flickers longer than `LONGEST`.
+    number
+        Number of each edge in the drop's own list.
+    gate
+        Number of its gate in the protocol's list; in `DropEdges` its channel.
     """
 
-    gate: int
     times: Array
     blocked: Flags
     burst: Array
-    edge: Index
-    rods: Index
-    blocks: Flags
-    levels: Array
-    thinned: int = 0
+    number: Index
+    gate: Index
 
 
-@dataclass(frozen=True, slots=True)
-class EdgeArrays:
-    """A drop's edges as arrays, one channel after the other, shape ``(edges,)`` each.
-
-    Of a flicker of more than `LONGEST` edges that many are kept, half at either end.
+class Passages(NamedTuple):
+    """Expected edges, one gate after the other, in order of time; shape ``(expected,)`` each.
 
     Attributes
     ----------
-    times, channels, blocked
-        Time, s, gate channel, and state after the edge.
-    burst
-        Duration of the flicker that each edge is part of, s; 0 if clean.
-    numbers
-        Number of each edge in the drop.
+    rods, blocks
+        Which rod passes, and whether it darkens the beam.
+    levels
+        Height of the chain's reference point by the nominal geometry, m; falling at each gate.
+    gate
+        Number of the gate in the protocol's list.
+    """
+
+    rods: Index
+    blocks: Flags
+    levels: Array
+    gate: Index
+
+
+class DropEdges(NamedTuple):
+    """Edges of a drop by channel.
+
+    Attributes
+    ----------
+    edges
+        Of a flicker of more than `LONGEST` edges that many, half at either end.
     received
         Number of edges by channel, including those left out; shape ``(channels,)``.
     """
 
-    times: Array
-    channels: Index
-    blocked: Flags
-    burst: Array
-    numbers: Index
+    edges: ObservedEdges
     received: Index
 
     @classmethod
-    def of(cls, edges: Sequence[Sequence[int]] | NDArray[np.int64], hz: float) -> EdgeArrays:
+    def of(cls, edges: Sequence[Sequence[int]] | NDArray[np.int64], hz: float) -> DropEdges:
         """Return arrays of edges given as rows of tick, channel and state; `hz` in ticks/s."""
         if not isinstance(edges, np.ndarray):
             flat = itertools.chain.from_iterable(edges)  # much faster than an array of rows
@@ -119,14 +114,19 @@ class EdgeArrays:
         place = np.arange(times.size)
         from_end = np.minimum(place - first[flicker], last[flicker] - place)
         spared = np.flatnonzero(from_end < LONGEST // 2)
-        return cls(
-            times[spared],
-            channels[spared],
-            edges[order[spared], 2].astype(np.bool_),
-            (times[last] - times[first])[flicker[spared]],
-            order[spared],
-            np.bincount(channels, minlength=1),
-        )
+        burst, blocked = times[last] - times[first], edges[order[spared], 2].astype(np.bool_)
+        seen = times[spared], blocked, burst[flicker[spared]], order[spared], channels[spared]
+        return cls(ObservedEdges(*seen), np.bincount(channels, minlength=1))
+
+    def at(self, gates: Sequence[tuple[int, Gate]]) -> tuple[ObservedEdges, int]:
+        """Return the edges of some gates with their numbers, and how many of these are left out."""
+        channels = [gate.channel for _, gate in gates]
+        ends = np.searchsorted(self.edges.gate, np.add.outer(channels, [0, 1]))
+        places = np.concatenate([np.arange(*end) for end in ends])
+        edges = ObservedEdges(*(column[places] for column in self.edges))
+        numbers = np.repeat([number for number, _ in gates], np.diff(ends)[:, 0])
+        received = sum(int(self.received[n : n + 1].sum()) for n in channels)
+        return edges._replace(gate=numbers), received - places.size
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,8 +139,10 @@ class ChainRecord:
         ``impact`` or ``free``.
     chain
         The chain that hangs there.
-    trains
-        A train for each gate.
+    edges
+        Observed edges at its gates.
+    passages
+        Expected edges at its gates, but for those `aside`.
     ratios
         ΔV/V at each impact for α = 1: m/(M + γm) of Eq. 9, shape ``(rods,)``; `None` for a free
         chain.
@@ -161,12 +163,15 @@ class ChainRecord:
         Height of each rod's middle above the contact point as its impact acts, m; empty for a free
         chain. Results refer to the level: the top rod falls on as if no rod lay there.
     aside
-        Trains of gates that are left out, too low for every rod to pass.
+        Numbers of gates that are left out, too low for every rod to pass.
+    thinned
+        Number of edges left out, from the middle of flickers longer than `LONGEST`.
     """
 
     role: Side
     chain: RodChain
-    trains: tuple[EdgeTrain, ...]
+    edges: ObservedEdges
+    passages: Passages
     ratios: Array | None = None
     alpha: float = 0.0
     air: Array = field(default_factory=lambda: ONE)
@@ -175,7 +180,8 @@ class ChainRecord:
     incline_deg: float = 0.0
     condition: str = ""
     higher: tuple[float, ...] = ()
-    aside: tuple[EdgeTrain, ...] = ()
+    aside: tuple[int, ...] = ()
+    thinned: int = 0
 
     @property
     def strikes(self) -> Array:
@@ -198,75 +204,42 @@ class ChainRecord:
     @property
     def edge_count(self) -> int:
         """Number of edges that a perfect rig would report."""
-        return sum(train.rods.size for train in self.trains)
-
-    def by_gate(self, match: Index) -> Iterator[tuple[EdgeTrain, slice, Index]]:
-        """Yield each train, the slice of its expected edges, and the train's edge of each.
-
-        Parameters
-        ----------
-        match
-            For each expected edge of all trains the observed edge of all trains, −1 if missed.
-        """
-        begin = first = 0
-        for train in self.trains:
-            expected = slice(begin, begin + train.rods.size)
-            edges = match[expected]
-            yield train, expected, np.where(edges >= 0, edges - first, -1)
-            begin, first = expected.stop, first + train.times.size
+        return self.passages.rods.size
 
 
-def edge_train(
-    number: int,
-    gate: Gate,
+@lru_cache(maxsize=256)  # a session needs the same few for every drop
+def passages_of(
+    heights: tuple[tuple[int, float], ...],
     chain: RodChain,
-    edges: EdgeArrays,
     start: float,
     higher: tuple[float, ...] | None,
-) -> EdgeTrain:
-    """Return the observed and expected edges of a gate.
+    darkening: bool,
+) -> Passages:
+    """Return the expected edges of a chain.
 
     Parameters
     ----------
-    number
-        Number of the gate in the protocol's list.
-    edges
-        All edges of the drop.
+    heights
+        Number of each gate in the protocol's list, with its height, m.
     start
         Nominal height of the bottom rod's middle before release, m.
     higher
         Height above the contact point at which each rod stops, m: no passage is expected below;
         `None` for a free chain.
+    darkening
+        Whether the timer records only edges that darken a beam, as some do.
     """
-    at_gate = slice(*np.searchsorted(edges.channels, [gate.channel, gate.channel + 1]).tolist())
-    # Some timers record only edges that darken a beam.
-    darkening = bool(edges.blocked.size and edges.blocked.all())
-    return EdgeTrain(
-        number,
-        edges.times[at_gate],
-        edges.blocked[at_gate],
-        edges.burst[at_gate],
-        edges.numbers[at_gate],
-        *_passages(gate.height, chain, start, higher, darkening),
-        int(edges.received[gate.channel : gate.channel + 1].sum()) - edges.times[at_gate].size,
-    )
-
-
-@lru_cache(maxsize=256)  # a session needs the same few for every drop
-def _passages(
-    height: float, chain: RodChain, start: float, higher: tuple[float, ...] | None, darkening: bool
-) -> tuple[Index, Flags, Array]:
-    """Return rods, polarities and levels of a beam's expected edges, as in `EdgeTrain`."""
-    places = np.array(chain.chain.heights)
-    widths = np.array(chain.widths)
+    places, half = np.array(chain.chain.heights), np.array(chain.widths)[:, None] / 2.0
+    gates, beams = [np.array(column) for column in zip(*heights, strict=True)]
     # A rod's lower side darkens the beam, its upper side clears it.
-    levels = np.stack([height - places + widths / 2, height - places - widths / 2], axis=1).ravel()
-    rods = np.repeat(np.arange(places.size), 2)
-    blocks = np.tile(np.array([True, False]), places.size)
+    levels = (beams[:, None, None] - places[:, None] + np.array([1.0, -1.0]) * half).ravel()
+    rods = np.tile(np.repeat(np.arange(places.size), 2), gates.size)
+    blocks = np.arange(levels.size) % 2 == 0
     seen = (levels < start) & (blocks | (not darkening))
     if higher is not None:
         seen &= levels > (np.array(higher) - places)[rods]
-    passages = rods[seen], blocks[seen], levels[seen]
+    gate = np.repeat(gates, 2 * places.size)
+    passages = Passages(rods[seen], blocks[seen], levels[seen], gate[seen])
     for values in passages:
         values.flags.writeable = False
     return passages
@@ -274,7 +247,7 @@ def _passages(
 
 def thin(drop: Drop, hz: float) -> Drop:
     """Return a drop without the middles of long flickers, for repeated analysis."""
-    numbers = np.sort(EdgeArrays.of(drop.edges, hz).numbers)
+    numbers = np.sort(DropEdges.of(drop.edges, hz).edges.number)
     return replace(drop, edges=tuple(drop.edges[n] for n in numbers.tolist()))
 
 
@@ -300,14 +273,15 @@ def unlike(chain: Chain, shares: Sequence[float]) -> Array:
 def chain_records(
     protocol: Protocol, run: Run, drop: Drop, hz: float, aside: Collection[int] = ()
 ) -> list[ChainRecord]:
-    """Return a record for each chain, with the trains of its gates.
+    """Return a record for each chain, with the edges of its gates.
 
     Parameters
     ----------
     aside
         Numbers of the gates that are left out, in the protocol's list.
     """
-    edges, shares = EdgeArrays.of(drop.edges, hz), air_shares(protocol)
+    whole, shares = DropEdges.of(drop.edges, hz), air_shares(protocol)
+    darkening = bool(whole.edges.blocked.size and whole.edges.blocked.all())
     sides: tuple[tuple[Side, str | None], ...] = (("impact", run.impact), ("free", run.free))
     records = []
     for role, name in sides:
@@ -316,16 +290,23 @@ def chain_records(
             continue
         chain, air = protocol.chains[name], np.array(shares[name])
         more, impacts = unlike(chain.chain, shares[name]), _impacts(protocol, run, role, chain)
-        higher, start = impacts.get("higher"), protocol.drop.value
-        trains = [edge_train(n, gate, chain, edges, start, higher) for n, gate in gates]
-        used, unused = (
-            tuple(train for train in trains if (train.gate in aside) == left_out)
-            for left_out in (False, True)
-        )
+        heights = tuple((n, gate.height) for n, gate in gates if n not in aside)
+        due = chain, protocol.drop.value, impacts.get("higher"), darkening
+        edges, thinned = whole.at(gates)
         # No rod falls after the last leg, but later edges need a leg too.
         legs = np.append(air, air[-1]) if impacts and np.ptp(air) else air[:1]
         records.append(
-            ChainRecord(role, chain, used, air=legs, unlike=more, aside=unused, **impacts)
+            ChainRecord(
+                role,
+                chain,
+                edges,
+                passages_of(heights, *due),
+                air=legs,
+                unlike=more,
+                aside=tuple(n for n, _ in gates if n in aside),
+                thinned=thinned,
+                **impacts,
+            )
         )
     return records
 

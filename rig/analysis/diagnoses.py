@@ -13,12 +13,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rig.analysis.annealing import MISSED
-from rig.analysis.chain_records import SIDES, ChainRecord, EdgeTrain
+from rig.analysis.chain_records import SIDES, ChainRecord
 from rig.analysis.distributions import most_by_chance
 from rig.analysis.equations import STRAY, standardise
 from rig.analysis.faults import Suspects, gate_values
 from rig.analysis.fit import DropFit, Fit, Matches, match
-from rig.arrays import Index
+from rig.arrays import Flags, Index
 from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, make_reason
 
@@ -32,51 +32,54 @@ identified."""
 
 
 class GateCount(NamedTuple):
-    """Edges of a gate, and the observed edge of each that is expected (−1: none)."""
+    """Edges of a gate.
+
+    Attributes
+    ----------
+    role, gate
+        Side, and number in the protocol's list.
+    rods, seen
+        Rod of each expected edge, and whether that is matched.
+    came, after
+        Number of observed edges, and of those after the last matched one.
+    """
 
     role: str
-    train: EdgeTrain
-    match: Index
+    gate: int
+    rods: Index
+    seen: Flags
+    came: int
+    after: int
 
     @property
     def missing(self) -> int:
         """Number of expected edges that are not matched."""
-        return int(np.count_nonzero(self.match < 0))
+        return int(np.count_nonzero(~self.seen))
 
     @property
     def share(self) -> float:
         """Matched share of its expected edges."""
-        return 1.0 - self.missing / self.match.size
+        return 1.0 - self.missing / self.seen.size
 
     @property
     def surplus(self) -> int:
         """Number of observed edges that belong to no rod."""
-        return self.train.times.size - self.match.size + self.missing
-
-    @property
-    def after(self) -> int:
-        """Number of observed edges after the last that belongs to a rod."""
-        return self.train.times.size - 1 - int(self.match.max(initial=-1))
+        return self.came - self.seen.size + self.missing
 
     @property
     def due(self) -> int:
         """Number of rods that should pass."""
-        return np.unique(self.train.rods).size
+        return np.unique(self.rods).size
 
     @property
     def hidden(self) -> int:
         """Number of rods with a missing edge."""
-        return np.unique(self.train.rods[self.match < 0]).size
-
-    @property
-    def seen(self) -> Index:
-        """Rod of each matched edge."""
-        return self.train.rods[self.match >= 0]
+        return np.unique(self.rods[~self.seen]).size
 
     @property
     def lacks_end(self) -> bool:
         """Whether it did not see the first or the last rod; by chance, it may be any."""
-        return not np.isin(self.train.rods[[0, -1]], self.seen).all()
+        return not np.isin(self.rods[[0, -1]], self.rods[self.seen]).all()
 
 
 def gate_counts(records: Iterable[ChainRecord], matches: Matches | None = None) -> list[GateCount]:
@@ -86,27 +89,30 @@ def gate_counts(records: Iterable[ChainRecord], matches: Matches | None = None) 
     """
     counts = []
     for record in records:
-        whole = np.full(record.edge_count, -1) if matches is None else matches[record.role]
-        for train, _, edges in record.by_gate(whole):
-            if train.rods.size and train.times.size:
-                number = np.arange(train.rods.size)
-                first = np.where(number < train.times.size, number, -1)
-                counts.append(GateCount(record.role, train, first if matches is None else edges))
+        passages, edges = record.passages, record.edges
+        for gate in sorted({*passages.gate.tolist()} & {*edges.gate.tolist()}):
+            here, came = passages.gate == gate, np.flatnonzero(edges.gate == gate)
+            rods, number = passages.rods[here], np.arange(np.count_nonzero(here))
+            match = np.where(number < came.size, came[0] + number, -1)
+            match = match if matches is None else matches[record.role][here]
+            after = int(came[-1]) - max(int(match.max()), int(came[0]) - 1)
+            counts.append(GateCount(record.role, gate, rods, match >= 0, came.size, after))
     return counts
 
 
 def silent(protocol: Protocol, records: Collection[ChainRecord]) -> Iterator[Reason]:
     """Yield reasons for gates without edges while the others have theirs."""
     heard = gate_counts(records)
-    if sum(gate.missing for gate in heard) >= STRANGE * sum(gate.match.size for gate in heard):
+    if sum(gate.missing for gate in heard) >= STRANGE * sum(gate.seen.size for gate in heard):
         return
     for record in records:
-        dead = [train for train in record.trains if train.rods.size and not train.times.size]
-        if len(dead) == len(record.trains) > 1:
+        due = sorted({*record.passages.gate.tolist()})
+        dead = [gate for gate in due if gate not in record.edges.gate]
+        if len(dead) == len(due) > 1:
             yield make_reason("side_silent", protocol.vocabulary, side=record.role)
         else:
-            for train in dead:
-                yield make_reason("gate_silent", protocol.vocabulary, **_values(protocol, train))
+            for gate in dead:
+                yield make_reason("gate_silent", protocol.vocabulary, **_values(protocol, gate))
 
 
 def gate_reasons(fit: Fit) -> Iterator[Reason]:
@@ -115,16 +121,16 @@ def gate_reasons(fit: Fit) -> Iterator[Reason]:
     words, beams, estimate = protocol.vocabulary, fit.model.unknowns["beams"], fit.estimate
     off = np.abs(standardise(estimate.x[beams], estimate.sd[beams]))
     for gate in gate_counts(records, fit.matches):
-        where, deviations = _values(protocol, gate.train), float(off[gate.train.gate])
+        where, deviations = _values(protocol, gate.gate), float(off[gate.gate])
         if gate.share < STRANGE or (gate.share < RIGHT and gate.missing > FEW):
             # A gate with few expected edges may miss a rod by chance, without effect on the result.
-            code = "gate_disagrees" if gate.match.size >= 2 * SIDES else "gate_disagrees_few"
+            code = "gate_disagrees" if gate.seen.size >= 2 * SIDES else "gate_disagrees_few"
             yield make_reason(code, words, **where, share=gate.share)
         elif deviations > STRAY:
             # With equal, evenly spaced rods an exchanged gate fits well at a wrong height.
             yield make_reason("gate_off", words, **where, deviations=deviations)
     yield from silent(protocol, records)
-    if aside := [_values(protocol, train) for record in records for train in record.aside]:
+    if aside := [_values(protocol, gate) for record in records for gate in record.aside]:
         yield make_reason("low_gates_miss_rods", words, at=aside)
 
 
@@ -142,22 +148,22 @@ def suspects(records: Collection[ChainRecord], matches: Matches | None = None) -
     more |= sum(gate.lacks_end for gate in crowded) > 1
     for record in records if matches else ():
         if gates := [gate for gate in counts if gate.role == record.role]:
-            due = {rod for gate in gates for rod in gate.train.rods.tolist()}
-            seen = {rod for gate in gates for rod in gate.seen.tolist()}
+            due = {rod for gate in gates for rod in gate.rods.tolist()}
+            seen = {rod for gate in gates for rod in gate.rods[gate.seen].tolist()}
             absent[record.chain.name] = sorted(due - seen)
             more |= min(gate.after for gate in gates) >= SIDES
-    return Suspects([gate.train.gate for gate in worst], absent, more)
+    return Suspects([gate.gate for gate in worst], absent, more)
 
 
 def _are_crossed(one: GateCount, other: GateCount) -> bool:
     """Whether the numbers of edges of two gates rather match each other's expectation."""
-    came, due = (one.train.times.size, other.train.times.size), (one.match.size, other.match.size)
+    came, due = (one.came, other.came), (one.seen.size, other.seen.size)
     own = abs(came[0] - due[0]) + abs(came[1] - due[1])
     return own - abs(came[0] - due[1]) - abs(came[1] - due[0]) >= 2 * SIDES
 
 
-def _values(protocol: Protocol, train: EdgeTrain) -> dict[str, Any]:
-    return gate_values(protocol.gates.gates[train.gate])
+def _values(protocol: Protocol, gate: int) -> dict[str, Any]:
+    return gate_values(protocol.gates.gates[gate])
 
 
 def gates_too_low(
@@ -171,7 +177,7 @@ def gates_too_low(
     Parameters
     ----------
     records
-        The chains with their trains.
+        The chains with their edges.
     drop
         `None` if the drop is not identified: then the number of edges is used.
 
@@ -185,10 +191,10 @@ def gates_too_low(
     due, hidden = sum(gate.due for gate in counts), sum(gate.hidden for gate in counts)
     struck, gates = [gate for gate in counts if gate.role == "impact"], protocol.gates.gates
     low: list[int] = []
-    for gate in sorted(struck, key=lambda gate: gates[gate.train.gate].height)[:-1]:
+    for gate in sorted(struck, key=lambda gate: gates[gate.gate].height)[:-1]:
         due, hidden = due - gate.due, hidden - gate.hidden
-        missed = MISSED * gate.match.size / gate.due  # each edge of a rod may be missed
+        missed = MISSED * gate.seen.size / gate.due  # each edge of a rod may be missed
         if gate.hidden <= most_by_chance(gate.due, max(missed, hidden / due)):
             break
-        low.append(gate.train.gate)
+        low.append(gate.gate)
     return tuple(low)

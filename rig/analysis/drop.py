@@ -116,7 +116,7 @@ class DropCase:
                 result = replace(result, gravity=free_gravity(fit))
             if fit.estimate.settled:
                 records, fitted = fit.model.records.values(), fit.begun
-                aside = tuple(train.gate for record in records for train in record.aside)
+                aside = tuple(gate for record in records for gate in record.aside)
         deviations = {name: value.deviation for name, value in result.quantities.items()}
         return DropSummary(self.scale, explain, result, readings, aside, fitted, deviations)
 
@@ -278,9 +278,8 @@ class DropCase:
 
 def _blank_audit(drop: Drop, records: Sequence[ChainRecord]) -> Audit:
     """Return the edge counts of a drop before any edge is matched."""
-    trains = [part for record in records for part in (*record.trains, *record.aside)]
-    left_out = sum(part.thinned for part in trains)
-    seen = sum(part.times.size for part in trains)
+    left_out = sum(record.thinned for record in records)
+    seen = sum(record.edges.times.size for record in records)
     expected = sum(record.edge_count for record in records)
     lost = 0 if drop.certificate is None else drop.certificate.overflows
     return Audit(seen + left_out, 0, expected, seen + left_out, lost, seen, left_out)

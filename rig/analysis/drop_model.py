@@ -138,10 +138,7 @@ class DropModel:
     @cached_property
     def pairings(self) -> dict[str, Pairing]:
         """Edges of each side, prepared for matching."""
-        return {
-            role: Pairing.of(record.trains, record.top_shadow)
-            for role, record in self.records.items()
-        }
+        return {role: Pairing(record) for role, record in self.records.items()}
 
     def under(self, protocol: Protocol) -> DropModel:
         """Return a copy with the priors of a protocol that differs in nothing else."""
@@ -168,12 +165,11 @@ class DropModel:
 
     def shaken(self, shifts: Mapping[str, Array]) -> DropModel:
         """Return a copy with each edge shifted in time, s, by role."""
-        return self.copy_with(
-            pairings={
-                role: replace(pairing, times=pairing.times + shifts[role])
-                for role, pairing in self.pairings.items()
-            }
-        )
+        records = {}
+        for role, record in self.records.items():
+            times = record.edges.times + shifts[role]
+            records[role] = replace(record, edges=record.edges._replace(times=times))
+        return self.with_edges(records)
 
     def released(self, releases: Mapping[str, float], alpha: float) -> Array:
         """Return the unknowns of a drop as stated, with α and release times, s, by role."""
@@ -236,9 +232,8 @@ class DropModel:
             return match
         last, seen = self._seen.get(role, (None, None))
         if seen is None or last is not match:
-            pairing = self.pairings[role]
-            pick, edge = matched(match)
-            seen = self.expected[role].seen(pick, pairing.times[edge], pairing.burst[edge])
+            edges, (pick, edge) = self.records[role].edges, matched(match)
+            seen = self.expected[role].seen(pick, edges.times[edge], edges.burst[edge])
             self._seen[role] = match, seen
         return seen
 
@@ -349,13 +344,6 @@ def _model_of(condition: _Condition) -> DropModel:
 def _expectations(record: ChainRecord) -> tuple[object, ...]:
     """Return the hashable content of a record without its edges."""
     arrays = [record.air, record.unlike, *(() if record.ratios is None else (record.ratios,))]
-    arrays += [part for train in record.trains for part in (train.rods, train.blocks, train.levels)]
-    gates = *(train.gate for train in record.trains), *(train.gate for train in record.aside)
     fields = record.role, record.chain, record.alpha, record.incline_deg, record.higher
-    return (
-        *fields,
-        record.condition,
-        gates,
-        len(record.trains),
-        *(array.tobytes() for array in arrays),
-    )
+    parts = (array.tobytes() for array in (*arrays, *record.passages))
+    return (*fields, record.condition, record.aside, *parts)

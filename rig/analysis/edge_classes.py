@@ -8,19 +8,21 @@ a rebounding rod, a later passage of the object, or unexplained.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from rig.analysis.annealing import MISSED, STRAYS
-from rig.analysis.chain_records import QUICK, WIDER, ChainRecord, EdgeTrain
+from rig.analysis.chain_records import QUICK, WIDER, ChainRecord
+from rig.analysis.drop_model import DropModel
 from rig.analysis.fit import Fit
 from rig.analysis.joint_step import JointDrop
 from rig.analysis.trajectory import Trajectory
 from rig.arrays import Array, Flags, Index
 from rig.plain_data import attributes
+from rig.protocol.protocol import Protocol
 
 EdgeClass = Literal[
     "missed",
@@ -89,28 +91,14 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
         Fitted drop, by itself or with the session.
     """
     model, x = drop.model, drop.x
-    clock, gates, gravity = model.rate(x), model.protocol.gates.gates, model.protocol.gravity.value
     unmatched: list[UnmatchedEdge] = []
     for role, record in model.records.items():
-        path, none = model.trajectory(role, x), np.zeros(0, dtype=np.intp)
-        lowest = min(gates[train.gate].height for train in record.trains)
-        due = path.times(model.all_levels(role, x)) / clock
-        for train, expected, match in record.by_gate(drop.matches[role]):
-            gate = gates[train.gate]
-            if (match < 0).any():
-                unmatched += _absent(gate.channel, train, match, due[expected])
-            if train.times.size > (match >= 0).sum():
-                # Only the lowest beam is within reach of rebounding rods.
-                near = gate.height == lowest and record.ratios is not None
-                classes: dict[EdgeClass, Flags] = {
-                    "string": train.burst > 0.0,
-                    "later passage": _later_passages(record, train, match, path, gravity),
-                    "bounce": train.times > (float(path.time[1]) / clock if near else np.inf),
-                }
-                unmatched += _surplus(gate.channel, train, match, classes)
-        for train in record.aside:
-            classes = {"left out": train.burst >= 0.0}
-            unmatched += _surplus(gates[train.gate].channel, train, none, classes)
+        match = drop.matches[role]
+        if (match < 0).any():
+            due = model.trajectory(role, x).times(model.all_levels(role, x)) / model.rate(x)
+            unmatched += _absent(model.protocol, record, match, due)
+        if record.edges.times.size > (match >= 0).sum():
+            unmatched += _surplus(model, record, match, model.trajectory(role, x), model.rate(x))
     return tuple(sorted(unmatched, key=lambda edge: edge.time_s))
 
 
@@ -120,43 +108,63 @@ def count_unexplained(unmatched: Iterable[UnmatchedEdge]) -> int:
 
 
 def _absent(
-    channel: int, train: EdgeTrain, match: Index, expected: Array
+    protocol: Protocol, record: ChainRecord, match: Index, due: Array
 ) -> Iterator[UnmatchedEdge]:
-    """Yield the missing edges of a gate, with classes from the state of its beam.
+    """Yield the missing edges of a chain, with classes from the state of their beams.
 
     If a rod is missed the beam stays bright; if a gap between rods is missed it stays dark.
     """
-    # Before the first edge, the place −1 is that of a bright beam.
-    dark = np.append(train.blocked, False)[np.searchsorted(train.times, expected) - 1]
+    rods, blocks, _, gates = record.passages
     for at in np.flatnonzero(match < 0).tolist():
-        kind: EdgeClass = "merged" if dark[at] else "missed" if train.times.size else "dead gate"
-        blocks, rod = bool(train.blocks[at]), int(train.rods[at])
-        yield UnmatchedEdge(kind, channel, float(expected[at]), blocks, rod, None, ABSENT)
+        here = slice(*np.searchsorted(record.edges.gate, [gates[at], gates[at] + 1]).tolist())
+        times, blocked = record.edges.times[here], record.edges.blocked[here]
+        before = int(np.searchsorted(times, due[at]))
+        dark = before > 0 and blocked[before - 1]
+        kind: EdgeClass = "merged" if dark else "missed" if times.size else "dead gate"
+        channel, rod = protocol.gates.gates[gates[at]].channel, int(rods[at])
+        yield UnmatchedEdge(kind, channel, float(due[at]), bool(blocks[at]), rod, None, ABSENT)
 
 
 def _surplus(
-    channel: int, train: EdgeTrain, match: Index, classes: Mapping[EdgeClass, Flags]
+    model: DropModel, record: ChainRecord, match: Index, path: Trajectory, clock: Array
 ) -> Iterator[UnmatchedEdge]:
-    """Yield the observed edges of a gate that belong to no rod, with the first class that holds.
+    """Yield the observed edges of a chain that belong to no rod, with the first class that holds.
 
     Chatter comes before all others: an edge in the same flicker as that of a rod.
     """
-    rods = np.full(train.times.size, -1)
-    rods[match[match >= 0]] = train.rods[: match.size][match >= 0]
+    gates, edges = model.protocol.gates.gates, record.edges
+    rods = np.full(edges.times.size, -1)
+    rods[match[match >= 0]] = record.passages.rods[match >= 0]
     # Edges within `QUICK` of each other belong to the same flicker, and share its number.
-    flicker = np.cumsum(np.diff(train.times, prepend=-np.inf) > QUICK)
+    begins = (np.diff(edges.times, prepend=-np.inf) > QUICK) | (np.diff(edges.gate, prepend=-1) > 0)
+    flicker = np.cumsum(begins)
+    classes: dict[EdgeClass, Flags] = {
+        "left out": np.isin(edges.gate, record.aside),
+        "string": edges.burst > 0.0,
+        "later passage": np.zeros(rods.size, dtype=np.bool_),
+        "bounce": np.zeros(rods.size, dtype=np.bool_),
+    }
+    if record.ratios is not None:
+        # Only the lowest beam is within reach of rebounding rods.
+        used = {*record.passages.gate.tolist()}
+        lowest = min(gates[gate].height for gate in used)
+        low = [gate for gate in used if gates[gate].height == lowest]
+        after = edges.times > float(path.time[1]) / clock
+        classes["bounce"] = np.isin(edges.gate, low) & after
+    elif record.chain.chain.rods == 1:
+        gravity = model.protocol.gravity.value
+        classes["later passage"] = _later_passages(record, rods >= 0, path, gravity)
     for at in np.flatnonzero(rods < 0).tolist():
         near = rods[(flicker == flicker[at]) & (rods >= 0)]
         kind = next((kind for kind, holds in classes.items() if holds[at]), UNEXPLAINED)
         kind, rod = ("chatter", int(near[0])) if near.size else (kind, None)
-        when, blocked, edge = float(train.times[at]), bool(train.blocked[at]), int(train.edge[at])
         cost = 0.0 if kind == "left out" else SURPLUS
-        yield UnmatchedEdge(kind, channel, when, blocked, rod, edge, cost)
+        when, blocked, number = float(edges.times[at]), bool(edges.blocked[at]), edges.number[at]
+        channel = gates[edges.gate[at]].channel
+        yield UnmatchedEdge(kind, channel, when, blocked, rod, int(number), cost)
 
 
-def _later_passages(
-    record: ChainRecord, train: EdgeTrain, match: Index, path: Trajectory, gravity: float
-) -> Flags:
+def _later_passages(record: ChainRecord, seen: Flags, path: Trajectory, gravity: float) -> Flags:
     """Return which edges are a single object's later passages of a gate after it rebounded.
 
     The object rises through a gate and falls through it again, with at most the energy of its first
@@ -164,19 +172,26 @@ def _later_passages(
     first within the flight time 2v/g. Neither holds for a pendulum, whose half period is longer,
     nor for edges of lower gates on the same channel. The last shadow may be single: the object
     turned in the beam, or the recording ended. Of a chain, surplus rods would look alike.
+
+    Parameters
+    ----------
+    seen
+        Whether each edge is matched.
     """
-    times, dark, back = train.times, train.blocked, np.zeros(train.times.size, dtype=np.bool_)
-    if record.ratios is not None or record.chain.chain.rods > 1 or not (match >= 0).any():
-        return back
-    first, speed = match.max(), float(path.heights(times[[match.max()]])[1][0])
-    begins = ends = np.arange(first + 1, times.size)
-    if not dark.all():  # else the timer records no ends of shadows
-        # Each shadow begins as the beam darkens and ends with the next edge.
-        shadow = (
-            dark[:-1] & ~dark[1:] & (np.diff(times) * speed * WIDER >= min(record.chain.widths))
-        )
-        begins = begins[:-1][shadow[first + 1 :]]
-        ends = begins + 1
-    paired = times[begins[1:]] - times[ends[:-1]] < 2.0 * speed * WIDER / gravity
-    back[begins] = back[ends] = np.append(paired, True) | np.append(False, paired)
+    back = np.zeros(seen.size, dtype=np.bool_)
+    for gate in {*record.edges.gate[seen].tolist()}:
+        here = np.flatnonzero(record.edges.gate == gate)
+        here = here[np.flatnonzero(seen[here])[-1] :]  # the last matched edge, and later ones
+        times, dark = record.edges.times[here], record.edges.blocked[here]
+        speed = float(path.heights(times[:1])[1][0])
+        begins = ends = np.arange(1, times.size)
+        if not record.edges.blocked.all():  # else the timer records no ends of shadows
+            # Each shadow begins as the beam darkens and ends with the next edge.
+            shadow = dark[:-1] & ~dark[1:]
+            shadow &= np.diff(times) * speed * WIDER >= min(record.chain.widths)
+            begins = begins[:-1][shadow[1:]]
+            ends = begins + 1
+        paired = times[begins[1:]] - times[ends[:-1]] < 2.0 * speed * WIDER / gravity
+        later = np.append(paired, True) | np.append(False, paired)
+        back[here[begins]] = back[here[ends]] = later
     return back

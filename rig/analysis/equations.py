@@ -128,10 +128,7 @@ class ExpectedEdges(NamedTuple):
     @classmethod
     def of(cls, record: ChainRecord, protocol: Protocol) -> ExpectedEdges:
         """Return the expected edges of a side at all its gates."""
-        trains, strikes = record.trains, record.strikes
-        expected = [train.rods.size for train in trains]
-        rods = np.concatenate([train.rods for train in trains])
-        levels = np.concatenate([train.levels for train in trains])
+        (rods, blocks, levels, gate), strikes = record.passages, record.strikes
         alone, landed = np.zeros(rods.size, dtype=np.bool_), np.zeros(rods.size)
         if record.ratios is not None and strikes.size > 1:
             alone = (rods == strikes.size - 1) & (levels < -strikes[-2])
@@ -139,9 +136,9 @@ class ExpectedEdges(NamedTuple):
             landed = _landing_sd(strike_u(record, protocol)[rods], to_strike)
         return cls(
             rods,
-            np.repeat([train.gate for train in trains], expected),
+            gate,
             levels,
-            np.where(np.concatenate([train.blocks for train in trains]), -0.5, 0.5),
+            np.where(blocks, -0.5, 0.5),
             np.where(rods % 2, -1.0, 1.0),
             drawn(lever(record.chain.chain)[rods], protocol, levels),
             alone,

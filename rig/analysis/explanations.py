@@ -240,11 +240,12 @@ class Explainer:
         """
         records, matches = reading.fit.model.records.values(), reading.fit.matches
         ticks = len(self.drop.edges) * math.log(self.stated.hz / hz)
-        missed = sum(
-            train.rods.size - np.setdiff1d(train.rods, train.rods[match >= 0]).size
-            for record in records
-            for train, _, match in record.by_gate(matches[record.role])
-        )
+        missed = 0
+        for record in records:
+            passages = record.passages
+            rods = passages.gate * record.chain.chain.rods + passages.rods
+            seen = rods[matches[record.role] >= 0]
+            missed += rods.size - np.setdiff1d(rods, seen).size
         return reading.evidence + ticks + missed * math.log(MISSED)
 
     def _records(self, premise: Premise) -> list[ChainRecord]:
@@ -277,10 +278,8 @@ class Explainer:
         for n, record in enumerate(records):
             if 2 * sum(votes) - expected < least:
                 break
-            edges = [
-                part.tobytes() for train in record.trains for part in (train.levels, train.edge)
-            ]
-            key = record.role, *scene, *edges
+            edges = record.edges.gate, record.edges.number, *record.passages
+            key = record.role, *scene, *(part.tobytes() for part in edges)
             if key not in self._votes:
                 # Many edges of a flicker vote for the same rod.
                 most = side_fall(protocol, record, self.clock_u).most_votes()

@@ -76,9 +76,8 @@ class DropFit:
         """Return the rod of each of the drop's edges, −1 if it belongs to none."""
         rods = np.full(edges, -1)
         for role, record in self.model.records.items():
-            for train, _, match in record.by_gate(self.matches[role]):
-                pick, edge = matched(match)
-                rods[train.edge[edge]] = train.rods[pick]
+            pick, edge = matched(self.matches[role])
+            rods[record.edges.number[edge]] = record.passages.rods[pick]
         return tuple(rods.tolist())
 
 
@@ -134,7 +133,8 @@ def match(model: DropModel, x: Array, *, late: bool = True) -> Matches:
     """
     matches: Matches = {}
     for role, pairing in model.pairings.items():
-        heights, speeds = model.trajectory(role, x).heights(pairing.times * model.rate(x))
+        times = model.records[role].edges.times * model.rate(x)
+        heights, speeds = model.trajectory(role, x).heights(times)
         landed = model.components.landed * model.expected[role].landed
         sd = np.hypot(_FINE, late * np.minimum(landed, model.records[role].pitch / PART))
         matches[role] = pairing.match(model.all_levels(role, x), heights, speeds, sd)

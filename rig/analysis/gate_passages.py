@@ -56,11 +56,7 @@ def gate_passages(fit: DropFit, measured: Callable[[Dual], Measured]) -> tuple[G
     if not model.protocol.one_object or "free" not in model.records:
         return ()
     gates = model.protocol.gates
-    seen = {
-        train.gate
-        for train, _, match in model.records["free"].by_gate(fit.matches["free"])
-        if (match >= 0).any()
-    }
+    seen = {*model.records["free"].passages.gate[fit.matches["free"] >= 0].tolist()}
     passages: list[GatePassage] = []
     before: Dual | None = None
     for n, gate in sorted(enumerate(gates.gates), key=lambda numbered: -numbered[1].height):

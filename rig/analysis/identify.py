@@ -16,7 +16,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from rig.analysis.annealing import LEAST, MISSED, PEAKS, FallFit, SideFall, log_density
+from rig.analysis.annealing import LEAST, MISSED, PEAKS, FallFit, Pairing, SideFall, log_density
 from rig.analysis.chain_records import SIDES, ChainRecord
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY
@@ -191,18 +191,17 @@ def well_read(fit: Fit) -> bool:
 
 def possible(record: ChainRecord) -> int:
     """Return how many edges of a side are matchable by gate and polarity alone."""
-    return sum(
-        int(min(np.count_nonzero(train.blocked == dark), np.count_nonzero(train.blocks == dark)))
-        for train in record.trains
-        for dark in (True, False)
-    )
+    pairing = Pairing(record)
+    kinds = 1 + max(pairing.kind.max(initial=0), pairing.kinds.max(initial=0))
+    counts = [np.bincount(kind, minlength=kinds) for kind in (pairing.kind, pairing.kinds)]
+    return int(np.minimum(*counts).sum())
 
 
 def _read(fall: SideFall, earliest: float, batches: int | None) -> list[FallFit]:
     """Anneal batches of starts until a reading explains the edges; the likeliest first."""
     readings: list[FallFit] = []
     least, matchable = LEAST * fall.record.edge_count, possible(fall.record)
-    if not fall.pairing.times.size or matchable < least:
+    if not fall.record.edges.times.size or matchable < least:
         return readings
     for starts in itertools.islice(fall.starts(earliest, least), batches):
         if len(starts):

@@ -231,17 +231,15 @@ def with_priors(groups: Sequence[DropGroup], components: Components) -> list[Dro
 
 def _edges(model: DropModel, drops: Sequence[DropFit]) -> dict[str, Seen]:
     edges = {}
-    models = [model.with_edges(drop.model.records) for drop in drops]
     for role, expected in model.expected.items():
         times = np.empty((len(drops), expected.rods.size))
         burst = np.full(times.shape, np.inf)
         for n, drop in enumerate(drops):
-            pairing = models[n].pairings[role]
-            pick, edge = matched(drop.matches[role])
+            record, (pick, edge) = drop.model.records[role].edges, matched(drop.matches[role])
             # Any moment after the release: at rest, a chain has no uncertainty.
             fallen = drop.x[model.unknowns[f"{role} release"]] + 1.0
-            times[n] = pairing.times[edge].max() if edge.size else fallen
-            times[n, pick], burst[n, pick] = pairing.times[edge], pairing.burst[edge]
+            times[n] = record.times[edge].max() if edge.size else fallen
+            times[n, pick], burst[n, pick] = record.times[edge], record.burst[edge]
         edges[role] = expected.seen(np.arange(expected.rods.size), times, burst)
     return edges
 

@@ -108,10 +108,10 @@ def _shake(fit: Fit, rng: Generator) -> DropModel:
     """Return the drop's model with edges shifted by the scatter that the fit estimated."""
     times = {}
     for role, match in fit.matches.items():
-        rows, pairing = fit.model.equations(role, fit.x, match), fit.model.pairings[role]
+        rows = fit.model.equations(role, fit.x, match)
         sigma = rows.residuals.sigma * fit.estimate.scatter
         off = sigma * rng.normal(size=sigma.size)
         off[1:] += rows.told[1:] * off[:-1]  # told is 0 but for the second edge of a pair
-        times[role] = np.zeros(pairing.times.size)
+        times[role] = np.zeros(fit.model.records[role].edges.times.size)
         times[role][matched(match)[1]] = off / rows.residuals.speed  # m at a beam to s
     return fit.model.shaken(times)

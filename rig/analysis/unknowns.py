@@ -253,7 +253,7 @@ def _turned_sd(side: Side) -> float | None:
 
 def _strike_sd(side: Side) -> float:
     """Prior of the strike height; the top rod may strike as high as beams not all rods pass."""
-    lying = [side.gates.gates[train.gate].height for train in side.record.aside]
+    lying = [side.gates.gates[gate].height for gate in side.record.aside]
     return max([float(strike_u(side.record, side.protocol)[-1]), *lying])
 
 

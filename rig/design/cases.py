@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rig.analysis.chain_records import ChainRecord, EdgeTrain, chain_records
+from rig.analysis.chain_records import ChainRecord, ObservedEdges, chain_records
 from rig.analysis.components import Components
 from rig.analysis.drop_model import DropModel
 from rig.analysis.owners import suffixes
@@ -128,24 +128,21 @@ def predict_drop(protocol: Protocol, run: Run, components: Components) -> tuple[
 
 def perfect(model: DropModel, x: Array) -> list[ChainRecord]:
     """Each chain of a drop with every edge seen where it should be."""
-    collected = []
-    for role, record in model.records.items():
-        path = model.trajectory(role, x)
-        trains = (
-            with_edges(train, np.arange(train.levels.size), path.times(train.levels))
-            for train in record.trains
-        )
-        collected.append(replace(record, trains=tuple(trains)))
-    return collected
+    return [
+        with_edges(record, np.arange(record.edge_count), model.trajectory(role, x).times(levels))
+        for role, record in model.records.items()
+        for levels in [record.passages.levels]
+    ]
 
 
-def with_edges(train: EdgeTrain, edges: Index, times: Array) -> EdgeTrain:
-    """Return the train of a beam that saw some of its expected edges, and no flicker.
+def with_edges(record: ChainRecord, seen: Index, times: Array) -> ChainRecord:
+    """Return the chain whose beams saw some of its expected edges, gate by gate, and no flicker.
 
     The number of each edge is that of the expected edge that it is.
     """
-    blocked = train.blocks[edges]
-    return replace(train, times=times, blocked=blocked, burst=0.0 * times, edge=edges)
+    _, blocks, _, gate = record.passages
+    edges = ObservedEdges(times, blocks[seen], 0.0 * times, seen, gate[seen])
+    return replace(record, edges=edges)
 
 
 def _case(
@@ -185,10 +182,10 @@ def _blocks(model: DropModel, x: Array, place: Index) -> Iterator[tuple[int, Equ
     for role, record in model.records.items():
         rows = model.equations(role, x, np.arange(record.edge_count))
         slopes = rows.slopes * (sd[rows.columns] / rows.residuals.sigma[:, None])
-        for train in record.trains:
-            own = [at[name].start + train.gate for name in _BEAMS if name in at]
+        for gate in np.unique(record.passages.gate).tolist():
+            own = [at[name].start + gate for name in _BEAMS if name in at]
             places = place.copy()
             places[own] = place.max() + 1 + np.arange(len(own))
-            seen, known = model.expected[role].gate == train.gate, places[rows.columns] >= 0
+            seen, known = record.passages.gate == gate, places[rows.columns] >= 0
             part = slopes[np.ix_(seen, known)]
-            yield train.gate, EquationRows(part, np.zeros(len(part)), places[rows.columns[known]])
+            yield gate, EquationRows(part, np.zeros(len(part)), places[rows.columns[known]])

@@ -8,7 +8,6 @@ every edge that is given to a rod is that rod's.
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
 from itertools import cycle, islice
 from typing import NamedTuple
 
@@ -93,17 +92,15 @@ def _fall(protocol: Protocol, run: Run, rng: np.random.Generator) -> list[ChainR
         if record.ratios is not None:
             shake("impulses")
         shake("datum", protocol.gates.posts.index(record.role))
-        path = model.trajectory(role, x)
-        trains = []
-        for train in record.trains:
-            shake("beams", train.gate)
-            levels = model.all_levels(role, x)[model.expected[role].gate == train.gate]
-            seen = np.flatnonzero((levels < path.height[0]) & (rng.random(levels.size) >= MISSED))
-            jitter = protocol.priors.jitter * rng.standard_normal(seen.size)
-            times = path.times(levels[seen]) + jitter
-            order = np.argsort(times, kind="stable")
-            trains.append(with_edges(train, seen[order], times[order]))
-        fallen.append(replace(record, trains=tuple(trains)))
+        path, gates = model.trajectory(role, x), record.passages.gate
+        for gate in np.unique(gates).tolist():
+            shake("beams", gate)
+        levels = model.all_levels(role, x)
+        seen = np.flatnonzero((levels < path.height[0]) & (rng.random(levels.size) >= MISSED))
+        jitter = protocol.priors.jitter * rng.standard_normal(seen.size)
+        times = path.times(levels[seen]) + jitter
+        order = np.lexsort((times, gates[seen]))
+        fallen.append(with_edges(record, seen[order], times[order]))
     return fallen
 
 
@@ -129,10 +126,8 @@ def read_drop(
     return identification, [
         record.role
         for record in records
-        if any(
-            np.any(train.edge[match[match >= 0]] != np.flatnonzero(match >= 0))
-            for train, _, match in record.by_gate(matches[record.role])
-        )
+        for match in [matches[record.role]]
+        if np.any(record.edges.number[match[match >= 0]] != np.flatnonzero(match >= 0))
     ]
 
 

@@ -111,8 +111,7 @@ def _blocks(drop: Fit | JointDrop, alphas: Array) -> tuple[list[EquationRows], i
     blocks, edges = [], 0
     for role, match in drop.matches.items():
         rows = model.equations(role, x, match)
-        pairing = model.pairings[role]
-        times = pairing.times[match[match >= 0]] * (1.0 + x[at["clock"]])
+        times = model.records[role].edges.times[match[match >= 0]] * (1.0 + x[at["clock"]])
         path = model.trajectory(role, x).sights(times)[2]
         # A contact point higher up is met as if every rod that strikes hung that much lower.
         lower = -path[:, COMMON + alphas.size :].sum(axis=1)

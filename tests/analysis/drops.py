@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.analysis.chain_records import ChainRecord, EdgeArrays, edge_train
+from rig.analysis.chain_records import ChainRecord, DropEdges, passages_of
 from rig.analysis.components import Components
 from rig.analysis.drop import DropCase
 from rig.analysis.drop_model import DropModel
@@ -78,19 +78,17 @@ class Case:
         return replace(self, drop=replace(self.drop, edges=ordered))
 
     def side(self, role: str) -> ChainRecord:
-        """One chain with the trains of its gates."""
+        """One chain with the edges of its gates."""
         struck = role == "impact"
         chain = self.protocol.chains[self.run.impact if struck else self.run.free]
-        edges = EdgeArrays.of(self.drop.edges, self.scale.hz)
+        whole = DropEdges.of(self.drop.edges, self.scale.hz)
+        gates = [(n, x) for n, x in enumerate(self.protocol.gates.gates) if x.side == role]
+        heights = tuple((number, gate.height) for number, gate in gates)
         higher = (0.0,) * chain.chain.rods if struck else None
-        trains = [
-            edge_train(number, gate, chain, edges, self.protocol.drop.value, higher)
-            for number, gate in enumerate(self.protocol.gates.gates)
-            if gate.side == role
-        ]
-        return ChainRecord(
-            role, chain, tuple(trains), impact_ratios(chain.chain) if struck else None
-        )
+        darkening = bool(whole.edges.blocked.all())
+        passages = passages_of(heights, chain, self.protocol.drop.value, higher, darkening)
+        ratios = impact_ratios(chain.chain) if struck else None
+        return ChainRecord(role, chain, whole.at(gates)[0], passages, ratios)
 
     @property
     def records(self) -> list[ChainRecord]:

@@ -57,7 +57,7 @@ def stamped_as_expected(model: DropModel, matches: dict, x: np.ndarray) -> DropM
         shifts = {}
         for role, match in matches.items():
             left = model.residuals(role, x, match)
-            shifts[role] = np.zeros(model.pairings[role].times.size)
+            shifts[role] = np.zeros(model.records[role].edges.times.size)
             shifts[role][match[match >= 0]] = left.values / left.speed
         model = model.shaken(shifts)
     return model
@@ -72,7 +72,7 @@ def beyond_strikes(model, role, x, match):
     pick = np.flatnonzero(match >= 0)
     if record.ratios is None:
         return np.full(pick.size, np.inf)
-    heights, _ = path.heights(model.pairings[role].times[match[pick]] * model.rate(x))
+    heights, _ = path.heights(model.records[role].edges.times[match[pick]] * model.rate(x))
     places = model.slopes[role].path[-record.ratios.size :]
     u = np.sqrt(places**2 @ model.unknowns.sd**2)
     off = (np.abs(heights[:, None] - path.height[1:]) / u).min(axis=1)
@@ -90,9 +90,7 @@ def test_the_jacobian_is_the_derivative_of_the_residuals(scene, seed):
     moving = np.zeros(x.size, dtype=np.bool_)
     for role, match in matches.items():
         found = model.equations(role, x, match)
-        assert found.residuals.values.size > 0.9 * sum(
-            train.rods.size for train in model.records[role].trains
-        )
+        assert found.residuals.values.size > 0.9 * model.records[role].edge_count
         expected, kinks = differences(
             lambda at, role=role, match=match: model.residuals(role, at, match).values,
             x,
@@ -176,12 +174,11 @@ def test_an_edge_is_as_sure_as_the_chain_is_slow():
     model, matches, x = case(UNIFORM, seed=3).model()
     for role, match in matches.items():
         found = model.residuals(role, x, match)
-        gates = [*model.records[role].by_gate(match)]
-        times = np.concatenate([t.times[m[m >= 0]] for t, _, m in gates])
-        burst = np.concatenate([t.burst[m[m >= 0]] for t, _, m in gates])
+        record = model.records[role]
+        times, burst = (column[match[match >= 0]] for column in record.edges[0:3:2])
         clock = x[model.unknowns["clock"]]
         _, speed = model.trajectory(role, x).heights(times * (1.0 + clock))
-        rods = np.concatenate([t.rods[m >= 0] for t, _, m in gates])
+        rods = record.passages.rods[match >= 0]
         hits = model.trajectory(role, x).time[1:]
         off = np.zeros(times.size)
         if role == "impact":

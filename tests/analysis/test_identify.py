@@ -104,22 +104,22 @@ def oracle(one: Case, least: float = 0.5) -> list[tuple[float, float, dict[int, 
     less than the `least` share of the expected edges: no reading that explains so little is near.
     """
     (record,) = one.records
-    choices = [readings(train.blocked.tolist(), train.blocks.tolist()) for train in record.trains]
+    edges, passages = record.edges, record.passages
+    choices = []
+    for gate in np.unique(passages.gate).tolist():
+        came, due = edges.gate == gate, passages.gate == gate
+        ways = readings(edges.blocked[came].tolist(), passages.blocks[due].tolist())
+        first = int(np.searchsorted(edges.gate, gate))
+        choices.append([[n + first if n >= 0 else -1 for n in way] for way in ways])
     found = []
     for choice in itertools.product(*choices):
-        times, rods, blocks, gates, numbers = [], [], [], [], []
-        for train, matches in zip(record.trains, choice, strict=True):
-            for place, edge in enumerate(matches):
-                if edge >= 0:
-                    times.append(train.times[edge])
-                    rods.append(train.rods[place])
-                    blocks.append(train.blocks[place])
-                    gates.append(train.gate)
-                    numbers.append(int(train.edge[edge]))
-        if len(times) < least * record.edge_count:
+        match = np.array([*itertools.chain(*choice)])
+        seen, edge = match >= 0, match[match >= 0]
+        if edge.size < least * record.edge_count:
             continue
-        arrays = np.array(times), np.array(rods), np.array(blocks), np.array(gates)
-        given = dict(zip(numbers, map(int, rods), strict=True))
+        rods = passages.rods[seen]
+        arrays = edges.times[edge], rods, passages.blocks[seen], passages.gate[seen]
+        given = dict(zip(edges.number[edge].tolist(), rods.tolist(), strict=True))
         likely = log_likelihood(one.protocol, *arrays)
         found.append((likely, arrays, given))
     found.sort(key=lambda row: -row[0])
