@@ -115,14 +115,14 @@ class Pairing:
     """
 
     def __init__(self, record: ChainRecord) -> None:
-        edges, passages = record.edges, record.passages
+        edges, due = record.edges, record.due
         self.record = record
         self.kind: Index = 2 * edges.gate + edges.blocked
-        self.kinds: Index = 2 * passages.gate + passages.blocks
+        self.kinds: Index = 2 * due.gate + due.blocks
         self.lasting: Array = np.zeros(edges.times.size)
         begins = np.flatnonzero(edges.blocked[:-1] & (np.diff(self.kind) == -1))
         self.lasting[begins] = self.lasting[begins + 1] = np.diff(edges.times)[begins]
-        is_top = passages.rods == passages.rods.max(initial=0)
+        is_top = due.rods == due.rods.max(initial=0)
         self.longest: Array = np.where(is_top, record.top_shadow, math.inf)
 
     @cached_property

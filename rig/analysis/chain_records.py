@@ -66,7 +66,7 @@ class ObservedEdges(NamedTuple):
     gate: Index
 
 
-class Passages(NamedTuple):
+class DueEdges(NamedTuple):
     """Expected edges, one gate after the other, in order of time; shape ``(expected,)`` each.
 
     Attributes
@@ -141,7 +141,7 @@ class ChainRecord:
         The chain that hangs there.
     edges
         Observed edges at its gates.
-    passages
+    due
         Expected edges at its gates, but for those `aside`.
     ratios
         ΔV/V at each impact for α = 1: m/(M + γm) of Eq. 9, shape ``(rods,)``; `None` for a free
@@ -171,7 +171,7 @@ class ChainRecord:
     role: Side
     chain: RodChain
     edges: ObservedEdges
-    passages: Passages
+    due: DueEdges
     ratios: Array | None = None
     alpha: float = 0.0
     air: Array = field(default_factory=lambda: ONE)
@@ -204,17 +204,17 @@ class ChainRecord:
     @property
     def edge_count(self) -> int:
         """Number of edges that a perfect rig would report."""
-        return self.passages.rods.size
+        return self.due.rods.size
 
 
 @lru_cache(maxsize=256)  # a session needs the same few for every drop
-def passages_of(
+def _due_edges(
     heights: tuple[tuple[int, float], ...],
     chain: RodChain,
     start: float,
     higher: tuple[float, ...] | None,
     darkening: bool,
-) -> Passages:
+) -> DueEdges:
     """Return the expected edges of a chain.
 
     Parameters
@@ -239,10 +239,10 @@ def passages_of(
     if higher is not None:
         seen &= levels > (np.array(higher) - places)[rods]
     gate = np.repeat(gates, 2 * places.size)
-    passages = Passages(rods[seen], blocks[seen], levels[seen], gate[seen])
-    for values in passages:
+    due = DueEdges(rods[seen], blocks[seen], levels[seen], gate[seen])
+    for values in due:
         values.flags.writeable = False
-    return passages
+    return due
 
 
 def thin(drop: Drop, hz: float) -> Drop:
@@ -291,7 +291,7 @@ def chain_records(
         chain, air = protocol.chains[name], np.array(shares[name])
         more, impacts = unlike(chain.chain, shares[name]), _impacts(protocol, run, role, chain)
         heights = tuple((n, gate.height) for n, gate in gates if n not in aside)
-        due = chain, protocol.drop.value, impacts.get("higher"), darkening
+        scene = chain, protocol.drop.value, impacts.get("higher"), darkening
         edges, thinned = whole.at(gates)
         # No rod falls after the last leg, but later edges need a leg too.
         legs = np.append(air, air[-1]) if impacts and np.ptp(air) else air[:1]
@@ -300,7 +300,7 @@ def chain_records(
                 role,
                 chain,
                 edges,
-                passages_of(heights, *due),
+                _due_edges(heights, *scene),
                 air=legs,
                 unlike=more,
                 aside=tuple(n for n, _ in gates if n in aside),

@@ -102,7 +102,7 @@ class Discrepancy:
         if nominal.hits is None or strikes.size < 2:
             return cls(nominal, stretch, lead, 0.0, 0.0)
         gap = float(strikes[-1] - strikes[-2])
-        seeing = record.passages.gate[record.passages.rods == strikes.size - 1].tolist()
+        seeing = record.due.gate[record.due.rods == strikes.size - 1].tolist()
         lowest = min((protocol.gates.gates[gate].height for gate in seeing), default=gap)
         unseen = strikes[-1] - strikes[:-1] <= max(lowest, gap)
         pulls, length = (nominal.hits.ratio * nominal.hits.arrival)[:-1], float(np.ptp(strikes))

@@ -89,14 +89,14 @@ def gate_counts(records: Iterable[ChainRecord], matches: Matches | None = None) 
     """
     counts = []
     for record in records:
-        passages, edges = record.passages, record.edges
-        for gate in sorted({*passages.gate.tolist()} & {*edges.gate.tolist()}):
-            here, came = passages.gate == gate, np.flatnonzero(edges.gate == gate)
-            rods, number = passages.rods[here], np.arange(np.count_nonzero(here))
-            match = np.where(number < came.size, came[0] + number, -1)
-            match = match if matches is None else matches[record.role][here]
-            after = int(came[-1]) - max(int(match.max()), int(came[0]) - 1)
-            counts.append(GateCount(record.role, gate, rods, match >= 0, came.size, after))
+        due, edges = record.due, record.edges
+        for gate in sorted({*due.gate.tolist()} & {*edges.gate.tolist()}):
+            here, came = np.flatnonzero(due.gate == gate), np.flatnonzero(edges.gate == gate)
+            first = np.append(came, np.full(here.size, -1))[: here.size]
+            match = first if matches is None else matches[record.role][here]
+            after = int(np.count_nonzero(came > match.max()))
+            rods, seen = due.rods[here], match >= 0
+            counts.append(GateCount(record.role, gate, rods, seen, came.size, after))
     return counts
 
 
@@ -106,7 +106,7 @@ def silent(protocol: Protocol, records: Collection[ChainRecord]) -> Iterator[Rea
     if sum(gate.missing for gate in heard) >= STRANGE * sum(gate.seen.size for gate in heard):
         return
     for record in records:
-        due = sorted({*record.passages.gate.tolist()})
+        due = sorted({*record.due.gate.tolist()})
         dead = [gate for gate in due if gate not in record.edges.gate]
         if len(dead) == len(due) > 1:
             yield make_reason("side_silent", protocol.vocabulary, side=record.role)

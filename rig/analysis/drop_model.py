@@ -345,5 +345,5 @@ def _expectations(record: ChainRecord) -> tuple[object, ...]:
     """Return the hashable content of a record without its edges."""
     arrays = [record.air, record.unlike, *(() if record.ratios is None else (record.ratios,))]
     fields = record.role, record.chain, record.alpha, record.incline_deg, record.higher
-    parts = (array.tobytes() for array in (*arrays, *record.passages))
+    parts = (array.tobytes() for array in (*arrays, *record.due))
     return (*fields, record.condition, record.aside, *parts)

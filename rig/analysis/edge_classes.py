@@ -16,7 +16,6 @@ import numpy as np
 
 from rig.analysis.annealing import MISSED, STRAYS
 from rig.analysis.chain_records import QUICK, WIDER, ChainRecord
-from rig.analysis.drop_model import DropModel
 from rig.analysis.fit import Fit
 from rig.analysis.joint_step import JointDrop
 from rig.analysis.trajectory import Trajectory
@@ -93,12 +92,12 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
     model, x = drop.model, drop.x
     unmatched: list[UnmatchedEdge] = []
     for role, record in model.records.items():
-        match = drop.matches[role]
+        match, path, clock = drop.matches[role], model.trajectory(role, x), model.rate(x)
         if (match < 0).any():
-            due = model.trajectory(role, x).times(model.all_levels(role, x)) / model.rate(x)
+            due = path.times(model.all_levels(role, x)) / clock
             unmatched += _absent(model.protocol, record, match, due)
         if record.edges.times.size > (match >= 0).sum():
-            unmatched += _surplus(model, record, match, model.trajectory(role, x), model.rate(x))
+            unmatched += _surplus(model.protocol, record, match, path, clock)
     return tuple(sorted(unmatched, key=lambda edge: edge.time_s))
 
 
@@ -114,54 +113,45 @@ def _absent(
 
     If a rod is missed the beam stays bright; if a gap between rods is missed it stays dark.
     """
-    rods, blocks, _, gates = record.passages
+    edges, (rods, blocks, _, gates) = record.edges, record.due
     for at in np.flatnonzero(match < 0).tolist():
-        here = slice(*np.searchsorted(record.edges.gate, [gates[at], gates[at] + 1]).tolist())
-        times, blocked = record.edges.times[here], record.edges.blocked[here]
-        before = int(np.searchsorted(times, due[at]))
-        dark = before > 0 and blocked[before - 1]
-        kind: EdgeClass = "merged" if dark else "missed" if times.size else "dead gate"
-        channel, rod = protocol.gates.gates[gates[at]].channel, int(rods[at])
-        yield UnmatchedEdge(kind, channel, float(due[at]), bool(blocks[at]), rod, None, ABSENT)
+        before = edges.blocked[(edges.gate == gates[at]) & (edges.times < due[at])]
+        seen: EdgeClass = "missed" if gates[at] in edges.gate else "dead gate"
+        kind = "merged" if before[-1:].any() else seen
+        channel, when = protocol.gates.gates[gates[at]].channel, float(due[at])
+        yield UnmatchedEdge(kind, channel, when, bool(blocks[at]), int(rods[at]), None, ABSENT)
 
 
 def _surplus(
-    model: DropModel, record: ChainRecord, match: Index, path: Trajectory, clock: Array
+    protocol: Protocol, record: ChainRecord, match: Index, path: Trajectory, clock: Array
 ) -> Iterator[UnmatchedEdge]:
     """Yield the observed edges of a chain that belong to no rod, with the first class that holds.
 
     Chatter comes before all others: an edge in the same flicker as that of a rod.
     """
-    gates, edges = model.protocol.gates.gates, record.edges
+    gates, edges = protocol.gates.gates, record.edges
     rods = np.full(edges.times.size, -1)
-    rods[match[match >= 0]] = record.passages.rods[match >= 0]
+    rods[match[match >= 0]] = record.due.rods[match >= 0]
     # Edges within `QUICK` of each other belong to the same flicker, and share its number.
-    begins = (np.diff(edges.times, prepend=-np.inf) > QUICK) | (np.diff(edges.gate, prepend=-1) > 0)
-    flicker = np.cumsum(begins)
-    classes: dict[EdgeClass, Flags] = {
-        "left out": np.isin(edges.gate, record.aside),
-        "string": edges.burst > 0.0,
-        "later passage": np.zeros(rods.size, dtype=np.bool_),
-        "bounce": np.zeros(rods.size, dtype=np.bool_),
-    }
+    is_new = np.diff(edges.gate, prepend=-1) > 0
+    flicker = np.cumsum(is_new | (np.diff(edges.times, prepend=-np.inf) > QUICK))
+    classes: dict[EdgeClass, Flags] = {"left out": np.isin(edges.gate, record.aside)}
+    classes["string"] = edges.burst > 0.0
     if record.ratios is not None:
         # Only the lowest beam is within reach of rebounding rods.
-        used = {*record.passages.gate.tolist()}
-        lowest = min(gates[gate].height for gate in used)
-        low = [gate for gate in used if gates[gate].height == lowest]
-        after = edges.times > float(path.time[1]) / clock
-        classes["bounce"] = np.isin(edges.gate, low) & after
+        heights = np.array([gate.height for gate in gates])
+        is_low = heights[edges.gate] == heights[record.due.gate].min()
+        classes["bounce"] = is_low & (edges.times > float(path.time[1]) / clock)
     elif record.chain.chain.rods == 1:
-        gravity = model.protocol.gravity.value
+        gravity = protocol.gravity.value
         classes["later passage"] = _later_passages(record, rods >= 0, path, gravity)
     for at in np.flatnonzero(rods < 0).tolist():
         near = rods[(flicker == flicker[at]) & (rods >= 0)]
         kind = next((kind for kind, holds in classes.items() if holds[at]), UNEXPLAINED)
         kind, rod = ("chatter", int(near[0])) if near.size else (kind, None)
-        cost = 0.0 if kind == "left out" else SURPLUS
-        when, blocked, number = float(edges.times[at]), bool(edges.blocked[at]), edges.number[at]
-        channel = gates[edges.gate[at]].channel
-        yield UnmatchedEdge(kind, channel, when, blocked, rod, int(number), cost)
+        when, blocked, edge = float(edges.times[at]), bool(edges.blocked[at]), int(edges.number[at])
+        cost, channel = 0.0 if kind == "left out" else SURPLUS, gates[edges.gate[at]].channel
+        yield UnmatchedEdge(kind, channel, when, blocked, rod, edge, cost)
 
 
 def _later_passages(record: ChainRecord, seen: Flags, path: Trajectory, gravity: float) -> Flags:

@@ -128,7 +128,7 @@ class ExpectedEdges(NamedTuple):
     @classmethod
     def of(cls, record: ChainRecord, protocol: Protocol) -> ExpectedEdges:
         """Return the expected edges of a side at all its gates."""
-        (rods, blocks, levels, gate), strikes = record.passages, record.strikes
+        (rods, blocks, levels, gate), strikes = record.due, record.strikes
         alone, landed = np.zeros(rods.size, dtype=np.bool_), np.zeros(rods.size)
         if record.ratios is not None and strikes.size > 1:
             alone = (rods == strikes.size - 1) & (levels < -strikes[-2])

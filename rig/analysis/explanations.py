@@ -242,10 +242,8 @@ class Explainer:
         ticks = len(self.drop.edges) * math.log(self.stated.hz / hz)
         missed = 0
         for record in records:
-            passages = record.passages
-            rods = passages.gate * record.chain.chain.rods + passages.rods
-            seen = rods[matches[record.role] >= 0]
-            missed += rods.size - np.setdiff1d(rods, seen).size
+            rods = record.due.gate * record.chain.chain.rods + record.due.rods
+            missed += rods.size - np.setdiff1d(rods, rods[matches[record.role] >= 0]).size
         return reading.evidence + ticks + missed * math.log(MISSED)
 
     def _records(self, premise: Premise) -> list[ChainRecord]:
@@ -278,7 +276,7 @@ class Explainer:
         for n, record in enumerate(records):
             if 2 * sum(votes) - expected < least:
                 break
-            edges = record.edges.gate, record.edges.number, *record.passages
+            edges = record.edges.gate, record.edges.number, *record.due
             key = record.role, *scene, *(part.tobytes() for part in edges)
             if key not in self._votes:
                 # Many edges of a flicker vote for the same rod.

@@ -77,7 +77,7 @@ class DropFit:
         rods = np.full(edges, -1)
         for role, record in self.model.records.items():
             pick, edge = matched(self.matches[role])
-            rods[record.edges.number[edge]] = record.passages.rods[pick]
+            rods[record.edges.number[edge]] = record.due.rods[pick]
         return tuple(rods.tolist())
 
 

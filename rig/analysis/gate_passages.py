@@ -1,4 +1,4 @@
-"""Passages of a single object through the gates: speed, and interval since the previous gate."""
+"""DueEdges of a single object through the gates: speed, and interval since the previous gate."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def gate_passages(fit: DropFit, measured: Callable[[Dual], Measured]) -> tuple[G
     if not model.protocol.one_object or "free" not in model.records:
         return ()
     gates = model.protocol.gates
-    seen = {*model.records["free"].passages.gate[fit.matches["free"] >= 0].tolist()}
+    seen = {*model.records["free"].due.gate[fit.matches["free"] >= 0].tolist()}
     passages: list[GatePassage] = []
     before: Dual | None = None
     for n, gate in sorted(enumerate(gates.gates), key=lambda numbered: -numbered[1].height):

@@ -188,7 +188,7 @@ class DropResult(Record):
     damaged
         Whether its stored record is damaged, which says nothing about the rig.
     gates
-        Passages of a single object through the gates.
+        DueEdges of a single object through the gates.
     last_passages
         Measurands from the last passages alone, see `rig.analysis.last_passages`.
     gravity

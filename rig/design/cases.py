@@ -131,7 +131,7 @@ def perfect(model: DropModel, x: Array) -> list[ChainRecord]:
     return [
         with_edges(record, np.arange(record.edge_count), model.trajectory(role, x).times(levels))
         for role, record in model.records.items()
-        for levels in [record.passages.levels]
+        for levels in [record.due.levels]
     ]
 
 
@@ -140,7 +140,7 @@ def with_edges(record: ChainRecord, seen: Index, times: Array) -> ChainRecord:
 
     The number of each edge is that of the expected edge that it is.
     """
-    _, blocks, _, gate = record.passages
+    _, blocks, _, gate = record.due
     edges = ObservedEdges(times, blocks[seen], 0.0 * times, seen, gate[seen])
     return replace(record, edges=edges)
 
@@ -182,10 +182,10 @@ def _blocks(model: DropModel, x: Array, place: Index) -> Iterator[tuple[int, Equ
     for role, record in model.records.items():
         rows = model.equations(role, x, np.arange(record.edge_count))
         slopes = rows.slopes * (sd[rows.columns] / rows.residuals.sigma[:, None])
-        for gate in np.unique(record.passages.gate).tolist():
+        for gate in np.unique(record.due.gate).tolist():
             own = [at[name].start + gate for name in _BEAMS if name in at]
             places = place.copy()
             places[own] = place.max() + 1 + np.arange(len(own))
-            seen, known = record.passages.gate == gate, places[rows.columns] >= 0
+            seen, known = record.due.gate == gate, places[rows.columns] >= 0
             part = slopes[np.ix_(seen, known)]
             yield gate, EquationRows(part, np.zeros(len(part)), places[rows.columns[known]])

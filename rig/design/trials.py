@@ -92,7 +92,7 @@ def _fall(protocol: Protocol, run: Run, rng: np.random.Generator) -> list[ChainR
         if record.ratios is not None:
             shake("impulses")
         shake("datum", protocol.gates.posts.index(record.role))
-        path, gates = model.trajectory(role, x), record.passages.gate
+        path, gates = model.trajectory(role, x), record.due.gate
         for gate in np.unique(gates).tolist():
             shake("beams", gate)
         levels = model.all_levels(role, x)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rig.analysis.chain_records import ChainRecord, DropEdges, passages_of
+from rig.analysis.chain_records import ChainRecord, chain_records
 from rig.analysis.components import Components
 from rig.analysis.drop import DropCase
 from rig.analysis.drop_model import DropModel
@@ -79,16 +79,10 @@ class Case:
 
     def side(self, role: str) -> ChainRecord:
         """One chain with the edges of its gates."""
-        struck = role == "impact"
-        chain = self.protocol.chains[self.run.impact if struck else self.run.free]
-        whole = DropEdges.of(self.drop.edges, self.scale.hz)
-        gates = [(n, x) for n, x in enumerate(self.protocol.gates.gates) if x.side == role]
-        heights = tuple((number, gate.height) for number, gate in gates)
-        higher = (0.0,) * chain.chain.rods if struck else None
-        darkening = bool(whole.edges.blocked.all())
-        passages = passages_of(heights, chain, self.protocol.drop.value, higher, darkening)
-        ratios = impact_ratios(chain.chain) if struck else None
-        return ChainRecord(role, chain, whole.at(gates)[0], passages, ratios)
+        hung = chain_records(self.protocol, self.run, self.drop, self.scale.hz)
+        record = next(record for record in hung if record.role == role)
+        ratios = impact_ratios(record.chain.chain) if role == "impact" else None
+        return ChainRecord(role, record.chain, record.edges, record.due, ratios)
 
     @property
     def records(self) -> list[ChainRecord]:

@@ -178,7 +178,7 @@ def test_an_edge_is_as_sure_as_the_chain_is_slow():
         times, burst = (column[match[match >= 0]] for column in record.edges[0:3:2])
         clock = x[model.unknowns["clock"]]
         _, speed = model.trajectory(role, x).heights(times * (1.0 + clock))
-        rods = record.passages.rods[match >= 0]
+        rods = record.due.rods[match >= 0]
         hits = model.trajectory(role, x).time[1:]
         off = np.zeros(times.size)
         if role == "impact":

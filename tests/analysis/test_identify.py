@@ -104,12 +104,11 @@ def oracle(one: Case, least: float = 0.5) -> list[tuple[float, float, dict[int, 
     less than the `least` share of the expected edges: no reading that explains so little is near.
     """
     (record,) = one.records
-    edges, passages = record.edges, record.passages
+    edges, due = record.edges, record.due
     choices = []
-    for gate in np.unique(passages.gate).tolist():
-        came, due = edges.gate == gate, passages.gate == gate
-        ways = readings(edges.blocked[came].tolist(), passages.blocks[due].tolist())
-        first = int(np.searchsorted(edges.gate, gate))
+    for gate in np.unique(due.gate).tolist():
+        came, first = edges.gate == gate, int(np.searchsorted(edges.gate, gate))
+        ways = readings(edges.blocked[came].tolist(), due.blocks[due.gate == gate].tolist())
         choices.append([[n + first if n >= 0 else -1 for n in way] for way in ways])
     found = []
     for choice in itertools.product(*choices):
@@ -117,9 +116,8 @@ def oracle(one: Case, least: float = 0.5) -> list[tuple[float, float, dict[int, 
         seen, edge = match >= 0, match[match >= 0]
         if edge.size < least * record.edge_count:
             continue
-        rods = passages.rods[seen]
-        arrays = edges.times[edge], rods, passages.blocks[seen], passages.gate[seen]
-        given = dict(zip(edges.number[edge].tolist(), rods.tolist(), strict=True))
+        arrays = edges.times[edge], due.rods[seen], due.blocks[seen], due.gate[seen]
+        given = dict(zip(edges.number[edge].tolist(), due.rods[seen].tolist(), strict=True))
         likely = log_likelihood(one.protocol, *arrays)
         found.append((likely, arrays, given))
     found.sort(key=lambda row: -row[0])
