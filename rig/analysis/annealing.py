@@ -410,8 +410,8 @@ class SideFall:
         x[self.columns[RELEASE]] = fall[RELEASE] * (1.0 + x[self.columns[CLOCK]])
         return FallFit(x, edges, evidence if math.isfinite(evidence) else -math.inf, scatter)
 
-    def nodes(self) -> Array:
-        """Return the grid of starting points, the likeliest first.
+    def nodes(self, most: int = _NODES) -> Array:
+        """Return the grid of starting points, the likeliest first, and no more than `most`.
 
         The grid is fine enough that, with the release free, every fall is within the first step's
         σ of a grid point.
@@ -430,7 +430,7 @@ class SideFall:
                 grid[:, name] += np.tile(axis, len(grid) // axis.size)
                 # Points outside the radius cannot come back inside with further unknowns.
                 unlikely = (grid * grid).sum(axis=1)
-                order = np.argsort(unlikely, kind="stable")[:_NODES]
+                order = np.argsort(unlikely, kind="stable")[:most]
                 grid = grid[order[unlikely[order] <= _FAR**2 + 1e-9]]
         return np.asarray(grid[((grid >= low) & (grid <= high)).all(axis=1)])
 
@@ -460,11 +460,11 @@ class SideFall:
 
     def most_votes(self) -> int:
         """Return the most votes for any fall of the grid's first, likeliest batch."""
-        return int(self._count_votes(self.nodes()[:_BATCH])[1].max(initial=0))
+        return int(self._count_votes(self.nodes(_BATCH))[1].max(initial=0))
 
     def most_matches(self) -> int:
         """Return how many edges agree, each with a side of its own, with the fall of most votes."""
-        falls, votes = self._count_votes(self.nodes()[:_BATCH])
+        falls, votes = self._count_votes(self.nodes(_BATCH))
         fall, (edge, side) = falls[np.argsort(-votes)[:1]], self.pairing.pairs
         heights = self.path(fall).heights(self.since(fall, self.record.edges.times))[0]
         near = (np.abs(heights[:, edge] - self.levels[side]) <= self.slack).any(axis=0)

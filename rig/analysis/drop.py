@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from rig.analysis.budgets import Budgets
-from rig.analysis.chain_records import ChainRecord, chain_records, thin
+from rig.analysis.chain_records import ChainRecord, chain_records
 from rig.analysis.diagnoses import gates_too_low, silent, suspects
 from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
@@ -273,7 +273,7 @@ class DropCase:
 
     def _explainer(self, scale: TimeScale, suspects: Suspects) -> Explainer:
         premise = Premise(self.protocol, self.run, scale.hz, self.aside)
-        return Explainer(premise, thin(self.drop, scale.hz), scale.u, suspects)
+        return Explainer(premise, self.drop, scale.u, suspects)
 
 
 def _blank_audit(drop: Drop, records: Sequence[ChainRecord]) -> Audit:

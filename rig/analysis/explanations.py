@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from rig.analysis.annealing import LEAST, MISSED
-from rig.analysis.chain_records import ChainRecord, chain_records
+from rig.analysis.chain_records import ChainRecord, chain_records, thin
 from rig.analysis.diagnoses import RIGHT
 from rig.analysis.faults import Fault, Premise, Suspects, faults
 from rig.analysis.fit import Fit, approach, settle
@@ -103,6 +103,10 @@ class Explainer:
     suspects: Suspects
     _votes: dict[Hashable, int] = field(default_factory=dict)
     """Cache of a side's votes: a fault of a side does not change those of the other."""
+
+    @cached_property
+    def _thinned(self) -> Drop:
+        return thin(self.drop, self.stated.hz)
 
     @cached_property
     def _faults(self) -> tuple[list[Fault], list[Fault]]:
@@ -239,7 +243,7 @@ class Explainer:
         absent.
         """
         records, matches = reading.fit.model.records.values(), reading.fit.matches
-        ticks = len(self.drop.edges) * math.log(self.stated.hz / hz)
+        ticks = len(self._thinned.edges) * math.log(self.stated.hz / hz)
         missed = 0
         for record in records:
             rods = record.due.gate * record.chain.chain.rods + record.due.rods
@@ -247,7 +251,9 @@ class Explainer:
         return reading.evidence + ticks + missed * math.log(MISSED)
 
     def _records(self, premise: Premise) -> list[ChainRecord]:
-        return chain_records(premise.protocol, premise.run, self.drop, premise.hz, premise.aside)
+        return chain_records(
+            premise.protocol, premise.run, self._thinned, premise.hz, premise.aside
+        )
 
     def _by_votes(self, faults: Sequence[Fault]) -> Iterator[Explanation]:
         """Yield fits of the faults with most votes, each at its best size; best first."""

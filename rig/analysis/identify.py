@@ -177,7 +177,7 @@ def few_edges(shares: Mapping[str, float], words: Vocabulary) -> dict[str, Reaso
 
 def side_fall(protocol: Protocol, record: ChainRecord, clock_u: float) -> SideFall:
     """Return a side whose edges are to be counted that agree on a fall near the stated values."""
-    return SideFall(DropModel.of(protocol, [record], clock_u), record.role)
+    return SideFall(DropModel(protocol, [record], clock_u), record.role)
 
 
 def well_read(fit: Fit) -> bool:
