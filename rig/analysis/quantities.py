@@ -16,7 +16,7 @@ from rig.analysis.trajectory import Trajectory
 from rig.arrays import Array
 
 _STEP = 1e-3
-"""Way over which a rod's speed along its chain is taken, m: strings act over a hundred times it."""
+"""Way over which a rod's gain on its chain is taken, m: strings act over a hundred times it."""
 
 
 def measurands(model: DropModel, x: Array) -> dict[str, Dual]:
@@ -102,7 +102,8 @@ class AdjustedDrop:
         # A swinging chain turns as it falls, which lowers its top rod.
         slope = float(lever(chain)[-1]) / protocol.gravity.value
         level -= self.linear(f"{role} swing", slope) * (protocol.drop.value - levels)
-        level -= self.ahead(role, levels.value)
+        moved = Dual(0.0 * levels.value, levels.slopes) * self.gain(role, levels.value).value
+        level += moved - self.ahead(role, levels.value)
         if role == "free":
             return level
         last: Array = levels.value < self._path(role).height[chain.rods - 1]  # falls alone
@@ -120,10 +121,10 @@ class AdjustedDrop:
         modes = self.model.discrepancy.top(levels)
         return way + self.linear(STRETCHES[0], modes) + self.linear(STRETCHES[1], modes)
 
-    def speed_ahead(self, levels: Array, speed: Dual) -> Dual:
-        """Return the speed of the struck top rod less that of its chain at these levels, m/s."""
-        before, after = (self.ahead("impact", levels + way) for way in (0.5 * _STEP, -0.5 * _STEP))
-        return (after - before) * speed * (1.0 / _STEP)
+    def gain(self, role: str, levels: Array) -> Dual:
+        """Return how much further the top rod is `ahead` for each metre that its chain falls."""
+        before, after = (self.ahead(role, levels + way) for way in (0.5 * _STEP, -0.5 * _STEP))
+        return (after - before) * (1.0 / _STEP)
 
     @property
     def late(self) -> Dual:
@@ -143,7 +144,7 @@ class AdjustedDrop:
         path, level = self._path("impact"), -self.model.records["impact"].strikes[-1:]
         speed = self._by_path("impact", path.arrival, path.slopes.arrival)
         hit = self._by_path("impact", float(path.time[-1]), path.slopes.time[-1])
-        fast = speed + self.speed_ahead(level, speed)[0]
+        fast = speed + self.gain("impact", level)[0] * speed
         early = self.ahead("impact", level)[0] / fast
         speed = fast - self.gravity * early
         later = 0.5 * self.model.discrepancy.late_way * self.late / (speed * speed)

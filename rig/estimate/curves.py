@@ -110,7 +110,7 @@ def _squares(drop: AdjustedDrop, heights: Array) -> Dual:
     for _ in range(2):  # what the top rod is off its chain hardly depends on the level
         levels = levels + heights - drop.top("impact", levels)
     speed = drop.squares("impact", levels).root()
-    speed += drop.speed_ahead(levels.value, speed)
+    speed += drop.gain("impact", levels.value) * speed
     if (catching_up := drop.model.discrepancy.late_way) > 0.0:  # below the lowest beam
         speed += drop.late * np.clip(1.0 - heights / catching_up, 0.0, 1.0)
     return speed * speed

@@ -82,7 +82,8 @@ class Case:
         hung = chain_records(self.protocol, self.run, self.drop, self.scale.hz)
         record = next(record for record in hung if record.role == role)
         ratios = impact_ratios(record.chain.chain) if role == "impact" else None
-        return ChainRecord(role, record.chain, record.edges, record.due, ratios)
+        hangs = {"air": record.air, "unlike": record.unlike}
+        return ChainRecord(role, record.chain, record.edges, record.due, ratios, **hangs)
 
     @property
     def records(self) -> list[ChainRecord]:
