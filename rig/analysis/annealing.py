@@ -213,8 +213,8 @@ class FallFit(NamedTuple):
     ----------
     x
         The drop's unknowns by this side alone, shape ``(unknowns,)``.
-    match
-        Observed edge of every expected edge, −1 if missed.
+    matches
+        Observed edge of every expected edge, −1 if missed; in a list, as those of a drop's sides.
     evidence
         Logarithm of the marginal likelihood, relative to all edges being strays.
     scatter
@@ -222,19 +222,14 @@ class FallFit(NamedTuple):
     """
 
     x: Array
-    match: Index
+    matches: list[Index]
     evidence: float
     scatter: float
 
     @property
-    def matches(self) -> list[Index]:
-        """`match` in a list, as of a drop with a single side."""
-        return [self.match]
-
-    @property
     def match_count(self) -> int:
         """Number of edges matched to a rod."""
-        return int(np.count_nonzero(self.match >= 0))
+        return int(np.count_nonzero(self.matches[0] >= 0))
 
 
 @dataclass(frozen=True)
@@ -408,7 +403,7 @@ class SideFall:
         scatter = math.sqrt(float(((off / sigma) ** 2).sum()) / max(1, sides.size))
         x = self.unknowns(fall)
         x[self.columns[RELEASE]] = fall[RELEASE] * (1.0 + x[self.columns[CLOCK]])
-        return FallFit(x, edges, evidence if math.isfinite(evidence) else -math.inf, scatter)
+        return FallFit(x, [edges], evidence if math.isfinite(evidence) else -math.inf, scatter)
 
     def nodes(self, most: int = _NODES) -> Array:
         """Return the grid of starting points, the likeliest first, and no more than `most`.

@@ -80,23 +80,15 @@ class Discrepancy:
     late_way: float
 
     @classmethod
-    def of(
-        cls, record: ChainRecord, rods: Index, levels: Array, protocol: Protocol, kappa: float
-    ) -> Discrepancy:
-        """Return the discrepancy on the chain's nominal fall with drag κ, 1/m.
-
-        Parameters
-        ----------
-        rods, levels
-            As in `rig.analysis.equations.ExpectedEdges`.
-        """
+    def of(cls, record: ChainRecord, protocol: Protocol, kappa: float) -> Discrepancy:
+        """Return the discrepancy on the chain's nominal fall with drag κ, 1/m."""
         assert record.ratios is not None
         strikes, gains = record.strikes, np.full(record.strikes.size, record.alpha)
         start, gravity = max(protocol.drop.value, LOWEST_START), protocol.gravity.value
         nominal = struck_trajectory(
             0.0, start, gravity, gains, record.ratios, strikes, kappa, record.air
         )
-        stretch = stretch_modes(nominal, rods, levels)
+        stretch = stretch_modes(nominal, record.due.rods, record.due.levels)
         free = free_trajectory(0.0, start, gravity, kappa, record.air)
         lead = float((free.heights(nominal.time[-1:])[0] - nominal.height[-1:])[0])
         if nominal.hits is None or strikes.size < 2:

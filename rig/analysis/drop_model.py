@@ -89,10 +89,8 @@ class DropModel:
             role: ExpectedEdges.of(record, protocol) for role, record in self.records.items()
         }
         if "impact" in self.records:
-            record, edges = self.records["impact"], self.expected["impact"]
-            self.discrepancy: Discrepancy = Discrepancy.of(
-                record, edges.rods, edges.levels, protocol, self._kappa
-            )
+            record = self.records["impact"]
+            self.discrepancy: Discrepancy = Discrepancy.of(record, protocol, self._kappa)
         self.directions: dict[object, Array] = {}
         self._seen: dict[str, tuple[Index, Seen]] = {}
         self.slopes = {role: side_slopes(self, role) for role in self.records}
@@ -170,15 +168,6 @@ class DropModel:
             times = record.edges.times + shifts[role]
             records[role] = replace(record, edges=record.edges._replace(times=times))
         return self.with_edges(records)
-
-    def released(self, releases: Mapping[str, float], alpha: float) -> Array:
-        """Return the unknowns of a drop as stated, with α and release times, s, by role."""
-        x = np.zeros(len(self.unknowns))
-        for role, release in releases.items():
-            x[self.unknowns[f"{role} release"]] = release
-        if "impact" in releases:
-            x[self.unknowns["alpha"]] = alpha
-        return x
 
     def rate(self, x: Array) -> Array:
         """Return the factor from stamped times to true times, shape ``(1,)`` or ``(drops, 1)``."""

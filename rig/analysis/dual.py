@@ -61,6 +61,10 @@ class Dual:
         slopes = self.slopes - _times(other.slopes, ratio)
         return Dual(ratio, _times(slopes, 1.0 / other.value))
 
+    def along(self, other: Dual, slope: Any) -> Dual:
+        """Return the quantity as a function of another one too, with its derivative by that."""
+        return Dual(self.value, self.slopes + _times(other.slopes, slope))
+
     def root(self) -> Dual:
         """Return the square root of a positive quantity."""
         root = np.sqrt(self.value)

@@ -281,7 +281,7 @@ def _begin(model: DropModel, pair: Sequence[FallFit]) -> DropFit:
     """Return a drop with the matches and unknowns of annealed falls."""
     x = _merge(model, pair)
     alpha = float(x[model.unknowns["alpha"]][0]) if "impact" in model.records else 0.0
-    matches = {role: side.match for role, side in zip(model.records, pair, strict=True)}
+    matches = {role: side.matches[0] for role, side in zip(model.records, pair, strict=True)}
     return DropFit(model.copy_with(alpha=alpha), matches, x)
 
 

@@ -88,12 +88,12 @@ class AdjustedDrop:
     def levels(self, role: str, times: Dual) -> Dual:
         """Return the height of a chain's reference point at `times`, m; shape ``(n,)``."""
         height, speed, slopes = self._path(role).sights(times.value)
-        return self._by_path(role, height, slopes) - Dual(0.0 * speed, times.slopes) * speed
+        return self._by_path(role, height, slopes).along(times, -speed)
 
     def squares(self, role: str, levels: Dual) -> Dual:
         """Return the squared speed of a chain at some levels by its path; shape ``(n,)``."""
         squares, slopes, steeper = self._path(role).squares(levels.value)
-        return self._by_path(role, squares, slopes) - Dual(0.0 * squares, levels.slopes) * steeper
+        return self._by_path(role, squares, slopes).along(levels, -steeper)
 
     def top(self, role: str, levels: Dual) -> Dual:
         """Return the height of the top rod for levels of the reference point, m; shape ``(n,)``."""
@@ -102,8 +102,8 @@ class AdjustedDrop:
         # A swinging chain turns as it falls, which lowers its top rod.
         slope = float(lever(chain)[-1]) / protocol.gravity.value
         level -= self.linear(f"{role} swing", slope) * (protocol.drop.value - levels)
-        moved = Dual(0.0 * levels.value, levels.slopes) * self.gain(role, levels.value).value
-        level += moved - self.ahead(role, levels.value)
+        gain = self.gain(role, levels.value).value
+        level -= self.ahead(role, levels.value).along(levels, -gain)
         if role == "free":
             return level
         last: Array = levels.value < self._path(role).height[chain.rods - 1]  # falls alone

@@ -123,7 +123,10 @@ def predict_drop(protocol: Protocol, run: Run, components: Components) -> tuple[
         chain = protocol.chains[run.impact].chain
         alpha, _ = model_alpha(protocol, chain, run.incline_deg, {})
     model = DropModel(protocol, records, CLOCK_U, components, alpha)
-    return model, model.released(dict.fromkeys(model.records, RELEASE_S), alpha)
+    x = np.where(model.unknowns.flat, RELEASE_S, 0.0)  # only α and releases have no prior
+    if "impact" in model.records:
+        x[model.unknowns["alpha"]] = alpha
+    return model, x
 
 
 def perfect(model: DropModel, x: Array) -> list[ChainRecord]:

@@ -82,8 +82,7 @@ class Case:
         hung = chain_records(self.protocol, self.run, self.drop, self.scale.hz)
         record = next(record for record in hung if record.role == role)
         ratios = impact_ratios(record.chain.chain) if role == "impact" else None
-        hangs = {"air": record.air, "unlike": record.unlike}
-        return ChainRecord(role, record.chain, record.edges, record.due, ratios, **hangs)
+        return replace(record, ratios=ratios, alpha=0.0)
 
     @property
     def records(self) -> list[ChainRecord]:
