@@ -123,18 +123,17 @@ def predict_drop(protocol: Protocol, run: Run, components: Components) -> tuple[
         chain = protocol.chains[run.impact].chain
         alpha, _ = model_alpha(protocol, chain, run.incline_deg, {})
     model = DropModel(protocol, records, CLOCK_U, components, alpha)
-    x = np.where(model.unknowns.flat, RELEASE_S, 0.0)  # only α and releases have no prior
-    if "impact" in model.records:
-        x[model.unknowns["alpha"]] = alpha
+    x = RELEASE_S * model.unknowns.flat  # only α and releases have no prior
+    x[model.unknowns.blocks.get("alpha", slice(0))] = alpha
     return model, x
 
 
 def perfect(model: DropModel, x: Array) -> list[ChainRecord]:
     """Each chain of a drop with every edge seen where it should be."""
     return [
-        with_edges(record, np.arange(record.edge_count), model.trajectory(role, x).times(levels))
+        with_edges(record, np.arange(record.edge_count), path.times(record.due.levels))
         for role, record in model.records.items()
-        for levels in [record.due.levels]
+        for path in [model.trajectory(role, x)]
     ]
 
 

@@ -17,6 +17,7 @@ from rig.analysis.annealing import MISSED
 from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import priors
 from rig.analysis.identify import LEAD, Identification, deciding_gate, identify, pattern_faults
+from rig.arrays import Index
 from rig.design.cases import CLOCK_U, perfect, predict_drop, with_edges
 from rig.protocol.contact import of_run
 from rig.protocol.plan import runs
@@ -80,7 +81,7 @@ def _fall(protocol: Protocol, run: Run, rng: np.random.Generator) -> list[ChainR
     model, x = predict_drop(protocol, run, priors(protocol))
     at, sd, fallen = model.unknowns, model.unknowns.sd, []
 
-    def shake(name: str, members: int | slice = slice(None)) -> None:
+    def shake(name: str, members: int | slice | Index = slice(None)) -> None:
         places = np.atleast_1d(np.arange(x.size)[at[name]][members])
         x[places] += sd[places] * rng.standard_normal(places.size)
 
@@ -93,8 +94,7 @@ def _fall(protocol: Protocol, run: Run, rng: np.random.Generator) -> list[ChainR
             shake("impulses")
         shake("datum", protocol.gates.posts.index(record.role))
         path, gates = model.trajectory(role, x), record.due.gate
-        for gate in np.unique(gates).tolist():
-            shake("beams", gate)
+        shake("beams", np.unique(gates))
         levels = model.all_levels(role, x)
         seen = np.flatnonzero((levels < path.height[0]) & (rng.random(levels.size) >= MISSED))
         jitter = protocol.priors.jitter * rng.standard_normal(seen.size)
