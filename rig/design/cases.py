@@ -123,7 +123,7 @@ def predict_drop(protocol: Protocol, run: Run, components: Components) -> tuple[
         chain = protocol.chains[run.impact].chain
         alpha, _ = model_alpha(protocol, chain, run.incline_deg, {})
     model = DropModel(protocol, records, CLOCK_U, components, alpha)
-    x: Array = RELEASE_S * model.unknowns.flat  # only α and releases have no prior
+    x: Array = np.array(RELEASE_S * model.unknowns.flat)  # only α and releases have no prior
     x[model.unknowns.blocks.get("alpha", slice(0))] = alpha
     return model, x
 
