@@ -60,6 +60,11 @@ def matched(match: Index) -> tuple[Index, Index]:
     return pick, match[pick]
 
 
+def count_matched(match: Index) -> int:
+    """Return the number of matched edges of a side."""
+    return int(np.count_nonzero(match >= 0))
+
+
 def log_density(off: Array, sigma: Array | float, speed: Array) -> Array:
     """Return the log likelihood ratio of each edge as a rod's edge against a stray.
 
@@ -103,8 +108,6 @@ class Pairing:
 
     Attributes
     ----------
-    record
-        The chain, with its edges.
     kind, kinds
         Kind of every observed and of every expected edge: twice the number of its gate, plus 1 if
         it darkens the beam.
@@ -116,7 +119,6 @@ class Pairing:
 
     def __init__(self, record: ChainRecord) -> None:
         edges, due = record.edges, record.due
-        self.record = record
         self.kind: Index = 2 * edges.gate + edges.blocked
         self.kinds: Index = 2 * due.gate + due.blocks
         self.lasting: Array = np.zeros(edges.times.size)
@@ -225,11 +227,6 @@ class FallFit(NamedTuple):
     matches: list[Index]
     evidence: float
     scatter: float
-
-    @property
-    def match_count(self) -> int:
-        """Number of edges matched to a rod."""
-        return int(np.count_nonzero(self.matches[0] >= 0))
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,6 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rig.analysis.trajectory import ONE
 from rig.arrays import Array, Flags, Index
@@ -100,11 +99,10 @@ class DropEdges(NamedTuple):
     received: Index
 
     @classmethod
-    def of(cls, edges: Sequence[Sequence[int]] | NDArray[np.int64], hz: float) -> DropEdges:
+    def of(cls, rows: Sequence[Sequence[int]], hz: float) -> DropEdges:
         """Return arrays of edges given as rows of tick, channel and state; `hz` in ticks/s."""
-        if not isinstance(edges, np.ndarray):
-            flat = itertools.chain.from_iterable(edges)  # much faster than an array of rows
-            edges = np.fromiter(flat, np.int64, 3 * len(edges)).reshape(-1, 3)
+        flat = itertools.chain.from_iterable(rows)  # much faster than an array of rows
+        edges = np.fromiter(flat, np.int64, 3 * len(rows)).reshape(-1, 3)
         order = np.argsort(edges[:, 1], kind="stable")
         times, channels = edges[order, 0] / hz, edges[order, 1].astype(np.intp)
         begins = np.diff(times, prepend=-np.inf) > QUICK

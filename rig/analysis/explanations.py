@@ -15,6 +15,7 @@ import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,6 +52,7 @@ _DEPARTURES = "stretch", "landed", "bounce"
 _BEYOND = 10.0  # factor on the scale of a departure, in a fall that departs from the equations
 
 
+_EVIDENCE = attrgetter("evidence")
 _NEITHER = Fault("", lambda stated, _: stated)
 """Rival hypothesis: no fault, in a fall by the equations or in one that departs from them."""
 _ACCUSING = {
@@ -130,8 +132,8 @@ class Explainer:
             return (*reasons,)
         causes = [cause for cause in self._explain(fit) if cause.whole or fit is None]
         # A fault found by score and by votes counts once.
-        ranked = [*{cause.fault.kin: cause for cause in sorted(causes, key=_evidence)}.values()]
-        ranked.sort(key=_evidence, reverse=True)
+        ranked = [*{cause.fault.kin: cause for cause in sorted(causes, key=_EVIDENCE)}.values()]
+        ranked.sort(key=_EVIDENCE, reverse=True)
         neither = next(cause.evidence for cause in ranked if cause.fault is _NEITHER)
         if ranked[0].fault is _NEITHER or ranked[0].evidence < neither + CLEAR:
             return (*reasons,)
@@ -173,7 +175,7 @@ class Explainer:
             return
         stated = Explanation(_NEITHER, {}, self._evidence(weigh(fit), self.stated.hz))
         causes = [stated, *self._along(fit), *self._by_votes(discrete)]
-        best = max(causes, key=_evidence)
+        best = max(causes, key=_EVIDENCE)
         if not (best.whole and best.fault.continuous) and (
             best is not stated or not well_read(fit)
         ):
@@ -342,7 +344,3 @@ class Explainer:
         evidence = self._evidence(reading, premise.hz) - CLEAR - occam
         complete = well_read(reading.fit) and not self._suggests_fault(reading.fit, premise, fault)
         return Explanation(fault, values, evidence, complete)
-
-
-def _evidence(cause: Explanation) -> float:
-    return cause.evidence

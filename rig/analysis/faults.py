@@ -15,8 +15,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from rig.analysis.annealing import count_matched
 from rig.analysis.drop_model import DropModel
-from rig.analysis.fit import DropFit, count_matched
+from rig.analysis.fit import DropFit
 from rig.analysis.unknowns import Unknown
 from rig.arrays import Array
 from rig.protocol.protocol import Gate, Protocol, RodChain, Run

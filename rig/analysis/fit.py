@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.analysis.adjust import Estimate, adjust
-from rig.analysis.annealing import PART, matched
+from rig.analysis.annealing import PART, count_matched, matched
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY
 from rig.arrays import Array, Index
@@ -32,11 +32,6 @@ _NEAR = 10.0  # standard uncertainties: step length after which edges are matche
 _ROUNDS = 6
 _MEDIANS = 2.2
 """Standard deviations for a median: 1/0.6745, times 1.5 for the scatter of few edges."""
-
-
-def count_matched(match: Index) -> int:
-    """Return the number of matched edges of a side."""
-    return int(np.count_nonzero(match >= 0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,9 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rig.analysis.annealing import count_matched
 from rig.analysis.averages import mean
 from rig.analysis.evidence import STATED_WEIGHT
-from rig.analysis.fit import Fit, count_matched
+from rig.analysis.fit import Fit
 from rig.analysis.result import DropResult, Measured, good_runs
 from rig.analysis.square_root import square_root
 from rig.analysis.unknowns import ANY_GRAVITY

@@ -16,7 +16,16 @@ from typing import TypeVar
 
 import numpy as np
 
-from rig.analysis.annealing import LEAST, MISSED, PEAKS, FallFit, Pairing, SideFall, log_density
+from rig.analysis.annealing import (
+    LEAST,
+    MISSED,
+    PEAKS,
+    FallFit,
+    Pairing,
+    SideFall,
+    count_matched,
+    log_density,
+)
 from rig.analysis.chain_records import SIDES, ChainRecord
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY
@@ -146,7 +155,7 @@ def identify(
     if all(side and side[0].evidence > 0.0 for side in readings.values()):
         return _together(model, readings)
     shares = {
-        role: max((reading.match_count for reading in side), default=0)
+        role: max((count_matched(*reading.matches) for reading in side), default=0)
         / max(1, model.records[role].edge_count)
         for role, side in readings.items()
     }
@@ -207,7 +216,8 @@ def _read(fall: SideFall, earliest: float, batches: int | None) -> list[FallFit]
         if len(starts):
             readings = _rank_readings([*readings, *fall.anneal(starts, _CLOSE)])
             best = readings[0]
-            if best.scatter < RESTLESS and best.match_count >= max(least, _CLEAR * matchable):
+            many = count_matched(*best.matches) >= max(least, _CLEAR * matchable)
+            if many and best.scatter < RESTLESS:
                 break
     return readings
 

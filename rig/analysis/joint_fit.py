@@ -47,6 +47,9 @@ _DONE = 0.02
 """Last step in standard uncertainties, root mean square over independent sums of shared unknowns,
 and last relative change of the components."""
 _SHORTEST = 1e-6  # least share of a step before the fit fails
+_FASTER, _SLOWER = 1.2, 0.5
+"""Factors on the pace of a component from round to round, as usual for Rprop (Riedmiller 1994): it
+would creep, or alternate."""
 _LEAST = {"floor": 5e-6, "departure": 5e-6, "few": 5e-6}
 """Components, m, below which others of the same variance dominate."""
 
@@ -176,15 +179,15 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
     x, beforehand = np.zeros(len(shared)), priors(fits[0].model.protocol)
     evidence = Evidence(beforehand, beforehand)
     settled, rests, size, before = False, 0, len(shared), evidence.components
-    previous = np.zeros(size + len(before.__slots__))
-    damping, inverse = np.ones_like(previous), np.eye(size)
+    pace, inverse = np.ones(size + len(before.__slots__)), np.eye(size)
+    previous = 0.0 * pace
     for round_ in range(STEPS):  # few drops need many, as they determine the scatter poorly
         groups = with_priors([group.at(x) for group in groups], evidence.components)
         # In the first round shared and own unknowns do not fit together yet: cut no residuals.
         sd, root, groups = joint_step(groups, x, STRAY if round_ else math.inf)
-        step = damping[:size] * root.step()
+        step = pace[:size] * root.step()
         # Once shared unknowns rest, halve steps: a drop's own may alternate about an impact.
-        share = 0.5 ** max(0, rests - _FIRST)
+        share = max(2.0 * _SHORTEST, 0.5 ** max(0, rests - _FIRST))
         moves = _move(groups, x, sd, step, share) if np.isfinite(step).all() else None
         if moves is None:
             settled, groups = False, []
@@ -200,13 +203,14 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
         rests = rests + 1 if settled else 0
         if settled and _steady(before, evidence.components, groups):
             break
-        # Halve steps that alternate, as they do next to a lower bound of a component.
-        ratios = damping[size:] * before.ratios(evidence.components)
-        evidence.components = before.times(ratios)
-        ahead = np.concatenate([step, ratios])
+        # A component that keeps its direction goes faster; what turns goes half as fast.
+        grown = before.ratios(evidence.components)
+        last, previous = previous, np.append(step, grown)
         if round_ > _FIRST:
-            damping[ahead * previous < 0.0] *= 0.5
-        previous = ahead
+            pace[size:] *= _FASTER
+            pace[previous * last < 0.0] *= _SLOWER
+        leap = np.maximum(np.abs(grown), 1.0)  # only small changes are made faster
+        evidence.components = before.times(np.clip(pace[size:] * grown, -leap, leap))
     gains = defaultdict[str, Array](partial(np.zeros, (size, size)))
     for group in groups:
         group.add_gains(gains)
