@@ -8,7 +8,7 @@ import math
 import re
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from typing import Any
 
 from rig.bundle.archive import CRATE, SUMS, seal, to_json
@@ -107,11 +107,9 @@ def compare(stored: Mapping[str, bytes], derived: Mapping[str, bytes]) -> Iterat
         In how many digits all results agree, then a line that begins with `WRONG` for each file or
         number that does not.
     """
-    try:
-        before = dict(_leaves("", json.loads(stored.get(RESULTS, b"{}"))))
-    except ValueError:
-        before = {}
-    after = dict(_leaves("", json.loads(derived[RESULTS])))
+    before, after = {}, dict(_leaves(json.loads(derived[RESULTS])))
+    with suppress(ValueError):
+        before = dict(_leaves(json.loads(stored.get(RESULTS, b"{}"))))
     equal = {place: _equal_digits(before.get(place), after.get(place)) for place in before | after}
     digits = min([n for n in equal.values() if n >= DIGITS], default=_ALL)
     agree = "all digits agree" if digits == _ALL else f"{digits} digits agree"
@@ -124,14 +122,14 @@ def compare(stored: Mapping[str, bytes], derived: Mapping[str, bytes]) -> Iterat
     for place, n in equal.items():
         if n < DIGITS:
             words = [f"{side.get(place, 'nothing')!s:.40}" for side in (before, after)]
-            yield f"{WRONG}{RESULTS}, {place}: {words[0]}; derived: {words[1]}"
+            yield f"{WRONG}{RESULTS}, {place[1:]}: {words[0]}; derived: {words[1]}"
 
 
-def _leaves(place: str, value: Any) -> Iterator[tuple[str, object]]:
+def _leaves(value: Any, place: str = "") -> Iterator[tuple[str, object]]:
     """Spread JSON over its numbers and words, by place."""
     if isinstance(value, dict | list):
         for key, member in value.items() if isinstance(value, dict) else enumerate(value):
-            yield from _leaves(f"{place}.{key}" if place else str(key), member)
+            yield from _leaves(member, f"{place}.{key}")
     else:
         yield place, float(value) if type(value) in {int, float} else value
 

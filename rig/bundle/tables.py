@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rig.bundle.archive import sha256
@@ -13,7 +14,7 @@ from rig.session.reading import Reader
 from rig.session.schema import TABLES
 from rig.text_rows import read_rows, read_text
 from rig.text_table import csv_text
-from rig.timers.edge_rows import HEADER, edges_text
+from rig.timers.edge_rows import edges_text
 
 if TYPE_CHECKING:  # tables are written without numpy
     from rig.clock.calibration import Calibration
@@ -22,26 +23,18 @@ _LISTS = ("budget", "causes", "gates")  # of objects, for which a cell has no ro
 _EDGES = "edges.csv"
 _ROWS_OF = {"states.csv: ": "run_state", "pings.csv: ": "ping", "edges.csv: ": "edge"}
 """Whose raw records a file has, for the meaning of its columns."""
-
-
 _ROWS = dict(read_rows(__file__, "columns.txt"))
 """The unit by the end of a column's name, which begins with ``_``, and what columns mean."""
-
-
-def _meanings() -> dict[str, str]:
-    """Return what columns mean, those of raw records and of measurands too."""
-    meanings = {
-        head + column.name: column.meaning
-        for head, table in [*_ROWS_OF.items(), ("", "run_state")]
-        for column in TABLES[table].columns
-    } | _ROWS
-    for row in MEASURANDS.values():
-        meanings |= {
-            row.name: row.meaning,
-            row.key("sd"): f"{row.symbol}: standard deviation between runs",
-            row.key("se"): f"{row.symbol}: standard error of the mean",
-        }
-    return meanings
+_MEANINGS = {
+    head + column.name: column.meaning
+    for head, table in [*_ROWS_OF.items(), ("", "run_state")]
+    for column in TABLES[table].columns
+} | _ROWS
+"""What columns mean, those of raw records and of measurands too."""
+for _row in MEASURANDS.values():
+    _MEANINGS[_row.name] = _row.meaning
+    _MEANINGS[_row.key("sd")] = f"{_row.symbol}: standard deviation between runs"
+    _MEANINGS[_row.key("se")] = f"{_row.symbol}: standard error of the mean"
 
 
 def csv_files(
@@ -73,12 +66,14 @@ def csv_files(
         {**entry._asdict(), "reasons": sentences(entry.reasons)} for entry in session.states()
     ]
     tables["pings.csv"] = [ping._asdict() for ping in session.pings()]
-    columns = {name: _columns(rows) for name, rows in tables.items() if name not in leave_out}
-    files = {name: csv_text(heading, tables[name]) for name, heading in columns.items()}
+    files = {
+        name: csv_text(_columns(rows), rows)
+        for name, rows in tables.items()
+        if name not in leave_out
+    }
     if _EDGES not in leave_out:
-        columns[_EDGES] = HEADER
         files[_EDGES] = edges_text(session.latest_drops(), lambda drop: clock.scale(drop).hz)
-    return files | {"README.txt": _readme(session, columns)}
+    return files | {"README.txt": _readme(session, files)}
 
 
 def result_tables(analysis: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
@@ -147,17 +142,18 @@ def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
     return columns
 
 
-def _columns(rows: Iterable[Mapping[str, object]]) -> Sequence[str]:
+def _columns(rows: Iterable[Mapping[str, object]]) -> list[str]:
     """All columns in order of appearance; a void run may lack some that later runs have."""
     fullest = sorted(rows, key=len, reverse=True)
     return list(dict.fromkeys(key for row in fullest for key in row))
 
 
-def _readme(session: Reader, described: Mapping[str, Sequence[str]]) -> str:
+def _readme(session: Reader, tables: Mapping[str, str]) -> str:
     lines = ["SIMULATED DATA: nothing fell.", ""] if session.simulated else []
     head = read_text(__file__, "readme.txt")
     lines += head.format(source=session.protocol_source, **session.meta).splitlines()
-    for name, columns in sorted(described.items()):
+    for name, text in sorted(tables.items()):
+        columns = next(csv.reader(text.splitlines()))
         lines += ["", name, *(f"  {column}{_describe(name, column)}" for column in columns)]
     return "\n".join(lines) + "\n"
 
@@ -172,8 +168,7 @@ def describe_column(table: str, column: str) -> tuple[str, str]:
     """Return unit and meaning of a table's column; empty where its name says all."""
     if column.endswith(("_u", "_U95")):
         return "", ""
-    meanings = _meanings()
-    meaning = meanings.get(f"{table}: {column}", meanings.get(column, ""))
+    meaning = _MEANINGS.get(f"{table}: {column}", _MEANINGS.get(column, ""))
     return column_unit(column), meaning
 
 
@@ -190,11 +185,10 @@ def data_package(tables: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _resource(table: str, text: str) -> dict[str, Any]:
-    header, *rows = csv.reader(text.splitlines()) if text.strip() else [[]]
     fields = []
-    for number, name in enumerate(header):
+    for name, *cells in zip(*csv.reader(text.splitlines()), strict=True):
         unit, meaning = describe_column(table, name)
-        kind = _type_of([row[number] for row in rows if row[number]])
+        kind = _type_of([*filter(None, cells)])
         field = {"name": name, "type": kind, "unit": unit, "description": meaning}
         fields.append({key: value for key, value in field.items() if value})
     return {
@@ -210,10 +204,8 @@ def _resource(table: str, text: str) -> dict[str, Any]:
 
 
 def _type_of(cells: list[str]) -> str:
-    for kind, read in (("integer", int), ("number", float)):
-        try:
-            [read(cell) for cell in cells]
-        except ValueError:
-            continue
-        return kind if cells else "string"
+    for kind, read in {"integer": int, "number": float}.items() if cells else ():
+        with suppress(ValueError):
+            sum(map(read, cells))
+            return kind
     return "string"
