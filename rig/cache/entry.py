@@ -33,18 +33,17 @@ class CacheEntry(Generic[Kept]):
 
     def __init__(self, kind: type[Kept], *content: object, fresh: bool = False) -> None:
         self._kind = kind
-        parts = repr((kind.__qualname__, *content)).encode()
         program = "" if None in content else _program()
-        self._key = program and f"{program} {hashlib.sha256(parts).hexdigest()}"
+        self._key = program and repr((program, kind.__qualname__, *content))
         self._fresh = fresh
-        self._file = CacheFolder()
+        self._folder = CacheFolder()
 
     def find(self) -> Kept | None:
         """Return a kept result; `None` where there is none."""
-        text = self._file.get(self._key) if self._key and not self._fresh else None
+        text = self._folder.get(self._key) if self._key and not self._fresh else None
         with suppress(ValueError):
-            result = from_text(text or "")
-            return result if isinstance(result, self._kind) else None
+            if isinstance(result := from_text(text or ""), self._kind):
+                return result
         return None
 
     def keep(self, result: Kept) -> Kept:
@@ -63,7 +62,7 @@ class CacheEntry(Generic[Kept]):
         """Keep a result as `keep` does, and return its text."""
         text = to_text(result)
         if self._key and not getattr(result, "failed", ()):
-            self._file.put(self._key, text)
+            self._folder.put(self._key, text)
         return text
 
 
