@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rig.measurands import ACCELERATION, FALL_TIME, GRAVITY, SEPARATION, SPEED, Measurand
+from rig.model.fall import air_legs
 from rig.model.prediction import PredictedIncline
 from rig.protocol.contact import as_struck, at_contact
 from rig.units import Quantity
@@ -140,14 +141,7 @@ def _free_fall(protocol: Protocol) -> PredictedIncline:
     ((name, rods),) = protocol.chains.items()
     length = protocol.drop.value + rods.chain.length
     start, gravity = protocol.initial_speed.value, protocol.gravity.value
-    if protocol.drag is None:
-        from rig.model.fall import free_leg  # noqa: PLC0415 - all that this scene needs
-
-        speed, time = free_leg(length, start, gravity)
-    else:
-        from rig.model.drag import drag_leg  # noqa: PLC0415 - only where there is air
-
-        speed, time = drag_leg(length, start, gravity, air_of(protocol, name)[0])
+    speed, time = air_legs(air_of(protocol, name))(length, start, gravity, 0)
     scene = "free fall" if protocol.track is None else "track"
     return PredictedIncline(
         incline_deg=0.0,
