@@ -7,9 +7,11 @@ The number is scaled by an exact fraction and rounded once, so ``48.5 mm`` is th
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
+from typing import NamedTuple
 
 from rig.text_rows import read_rows
 
@@ -43,8 +45,7 @@ class UnitError(ValueError):
     """A text is not the quantity that was asked for; says what was found and what is accepted."""
 
 
-@dataclass(frozen=True, slots=True)
-class Dimension:
+class Dimension(NamedTuple):
     """What a quantity measures, as its row of ``units.txt`` has it.
 
     Attributes
@@ -57,7 +58,7 @@ class Dimension:
 
     noun: str
     example: str
-    factors: Mapping[str, Fraction] = field(hash=False)
+    factors: Mapping[str, Fraction]
 
 
 def _dimension(noun: str, example: str, units: str) -> Dimension:
@@ -136,7 +137,7 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
     UnitError
         If the text is no such quantity; the message says what was found and what is accepted.
     """
-    text = repr(text) if isinstance(text, float) else str(text)
+    text = str(text)
     accepted_form = f"accepted: {dimension.noun}, such as {dimension.example}"
     clean = " ".join(text.split()).replace("−", "-")
     if len(clean) > _LONGEST:
@@ -203,18 +204,14 @@ def _factor(unit: str | None, dimension: Dimension, text: str) -> Fraction:
 
 def _scale(number: str, factor: Fraction, text: str) -> float:
     """Return ``number × factor``, rounded once."""
-    try:
+    with suppress(ArithmeticError):
         exact = Decimal(number)
         if exact == 0:
             return 0.0
-        if abs(exact.adjusted()) > _LARGEST_EXPONENT:
-            raise OverflowError
-        result = float(Fraction(exact) * factor)
-    except ArithmeticError:
-        result = 0.0
-    if result == 0:
-        raise UnitError(f"found {quote(text)}, too large or too small")
-    return result
+        is_usual = abs(exact.adjusted()) <= _LARGEST_EXPONENT
+        if is_usual and (result := float(Fraction(exact) * factor)):
+            return result
+    raise UnitError(f"found {quote(text)}, too large or too small")
 
 
 def format_quantity(quantity: Quantity, unit: str) -> str:
