@@ -55,15 +55,11 @@ class CacheEntry(Generic[Kept]):
             As `rig.cache.plain.to_text` takes it. One whose attribute `failed` names what it lacks
             is not kept.
         """
-        found: Kept = from_text(self.write(result))
-        return found
-
-    def write(self, result: Kept) -> str:
-        """Keep a result as `keep` does, and return its text."""
         text = to_text(result)
         if self._key and not getattr(result, "failed", ()):
             self._folder.put(self._key, text)
-        return text
+        found: Kept = from_text(text)
+        return found
 
 
 def recall(

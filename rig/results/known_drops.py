@@ -37,7 +37,7 @@ class KnownDrops:
         return stored and stored.whole()
 
     def __setitem__(self, drop: Drop, summary: DropSummary) -> None:
-        self._entry(drop).write(summary)
+        self._entry(drop).keep(summary)
 
     def _entry(self, drop: Drop) -> CacheEntry[DropSummary]:
         digest = sha256(f"{edges_digest(drop)} {replace(drop, edges=())}".encode()).hexdigest()
