@@ -72,7 +72,7 @@ def bundle_files(
         Contents by name, ``SHA256SUMS`` included.
     """
     protocol = protocol_of(session)
-    tables = csv_files(session, results.json(), results.clock)
+    tables = csv_files(session, results)
     readme = tables.pop("README.txt")
     # What drops have in common, and so covariances, only a joint fit knows.
     tables |= mean_tables(protocol, results.complete or results.analysis)

@@ -17,7 +17,7 @@ from rig.text_table import csv_text
 from rig.timers.edge_rows import edges_text
 
 if TYPE_CHECKING:  # tables are written without numpy
-    from rig.clock.calibration import Calibration
+    from rig.results.whole import SessionResults
 
 _LISTS = ("budget", "causes", "gates")  # of objects, for which a cell has no room
 _EDGES = "edges.csv"
@@ -38,7 +38,7 @@ for _row in MEASURANDS.values():
 
 
 def csv_files(
-    session: Reader, analysis: Mapping[str, Any], clock: Calibration, leave_out: Container[str] = ()
+    session: Reader, outcome: SessionResults, leave_out: Container[str] = ()
 ) -> dict[str, str]:
     """Make ``runs``, ``summary``, ``budget``, ``edges``, ``states`` and ``pings.csv``, a README.
 
@@ -49,10 +49,8 @@ def csv_files(
     ----------
     session
         Open, for the raw records.
-    analysis
-        What ``rig analyze --json`` prints.
-    clock
-        Of its times.
+    outcome
+        Results of the session.
     leave_out
         Names of files that are not wanted.
 
@@ -61,7 +59,7 @@ def csv_files(
     dict
         Texts by file name.
     """
-    tables = {f"{name}.csv": rows for name, rows in result_tables(analysis).items()}
+    tables = {f"{name}.csv": rows for name, rows in result_tables(outcome.json()).items()}
     tables["states.csv"] = [
         {**entry._asdict(), "reasons": sentences(entry.reasons)} for entry in session.states()
     ]
@@ -72,7 +70,8 @@ def csv_files(
         if name not in leave_out
     }
     if _EDGES not in leave_out:
-        files[_EDGES] = edges_text(session.latest_drops(), lambda drop: clock.scale(drop).hz)
+        drops = session.latest_drops()
+        files[_EDGES] = edges_text(drops, lambda drop: outcome.clock.scale(drop).hz)
     return files | {"README.txt": _readme(session, files)}
 
 
