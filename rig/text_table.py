@@ -2,7 +2,8 @@
 
 import csv
 import io
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from itertools import chain
 
 
 def text_table(
@@ -33,18 +34,21 @@ def text_table(
     return lines
 
 
-def csv_text(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) -> str:
+def csv_text(rows: Collection[Mapping[str, object]], columns: Iterable[str] = ()) -> str:
     """Write rows as CSV below their columns' names.
 
     Parameters
     ----------
-    columns
-        What a row has beyond them is left out, what it lacks is empty.
     rows
         Values by column; floats get the digits that give the same float back.
+    columns
+        What a row has beyond them is left out, what it lacks is empty. By default all that any row
+        has, in the order of the fullest: a void run may lack some that later runs have.
     """
+    fullest = sorted(rows, key=len, reverse=True)
+    heading = [*columns] or [*dict.fromkeys(chain.from_iterable(fullest))]
     text = io.StringIO()
-    writer = csv.DictWriter(text, [*columns], extrasaction="ignore", lineterminator="\n")
+    writer = csv.DictWriter(text, heading, extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
     return text.getvalue()

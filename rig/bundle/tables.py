@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Container, Iterable, Mapping
+from collections.abc import Container, Mapping
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -64,11 +64,7 @@ def csv_files(
         {**entry._asdict(), "reasons": sentences(entry.reasons)} for entry in session.states()
     ]
     tables["pings.csv"] = [ping._asdict() for ping in session.pings()]
-    files = {
-        name: csv_text(_columns(rows), rows)
-        for name, rows in tables.items()
-        if name not in leave_out
-    }
+    files = {name: csv_text(rows) for name, rows in tables.items() if name not in leave_out}
     if _EDGES not in leave_out:
         drops = session.latest_drops()
         files[_EDGES] = edges_text(drops, lambda drop: outcome.clock.scale(drop).hz)
@@ -139,12 +135,6 @@ def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
         else:
             columns[name] = value
     return columns
-
-
-def _columns(rows: Iterable[Mapping[str, object]]) -> list[str]:
-    """All columns in order of appearance; a void run may lack some that later runs have."""
-    fullest = sorted(rows, key=len, reverse=True)
-    return list(dict.fromkeys(key for row in fullest for key in row))
 
 
 def _readme(session: Reader, tables: Mapping[str, str]) -> str:
