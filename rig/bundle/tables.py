@@ -129,7 +129,7 @@ def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
             columns |= {f"{name}_{part}": value[part] for part in ("u", "U95") if part in value}
         elif isinstance(value, dict):
             columns |= flatten(value, f"{name}_")
-        elif isinstance(value, (list, tuple)):
+        elif isinstance(value, list):
             if dict not in map(type, value):
                 columns[name] = "; ".join(map(str, value))
         else:
