@@ -151,7 +151,15 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
     parts = match.groupdict()
     unit, u_unit, u_number = parts["unit"], parts["u_unit"], parts["u"]
     if u_number is not None:
-        unit, u_unit = _shared_unit(clean, unit, u_unit)
+        if unit is not None and u_unit is None:
+            raise UnitError(f"found {quote(clean)}; the part after ± needs a unit too")
+        if unit is None and u_unit in _RELATIVE:
+            # "0.50 ± 10 %" is read by some as 10 % of 0.50 and by others as (0.50 ± 10) %.
+            raise UnitError(
+                f"found {quote(clean)}, which has two meanings; "
+                f"write both parts in the same unit: 0.50 ± 0.05 or 50 % ± 5 %"
+            )
+        unit = unit or u_unit
     factor = _factor(unit, dimension, clean)
     value = _scale(parts["value"], factor / int(parts["per"] or 1), clean)
     if parts["last"]:
@@ -167,19 +175,6 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
 def _match(text: str) -> re.Match[str] | None:
     """Match a quantity; a unit behind brackets is of both numbers in them."""
     return _PLAIN.fullmatch(_BRACKETED.sub(r"\1 \4 \2 \3 \4", text))
-
-
-def _shared_unit(text: str, unit: str | None, u_unit: str | None) -> tuple[str | None, str | None]:
-    """Return the units of a value and of what stands behind its ``±``."""
-    if unit is not None and u_unit is None:
-        raise UnitError(f"found {quote(text)}; the part after ± needs a unit too")
-    if unit is None and u_unit in _RELATIVE:
-        # "0.50 ± 10 %" is read by some as 10 % of 0.50 and by others as (0.50 ± 10) %.
-        raise UnitError(
-            f"found {quote(text)}, which has two meanings; "
-            f"write both parts in the same unit: 0.50 ± 0.05 or 50 % ± 5 %"
-        )
-    return unit or u_unit, u_unit
 
 
 def _factor(unit: str | None, dimension: Dimension, text: str) -> Fraction:
