@@ -79,9 +79,10 @@ def result_tables(analysis: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]
     analysis
         What ``rig analyze --json`` prints. Without gates' passages there is no table of them.
     """
-    latest, superseded = analysis.get("runs", []), analysis.get("superseded", [])
+    latest, superseded = analysis["runs"], analysis.get("superseded", [])
+    drops = [*latest, *superseded]
     # Where nothing is struck, nothing is inclined either.
-    struck = any(run.get("impact_chain", "") is not None for run in (*latest, *superseded))
+    struck = any(drop["impact_chain"] is not None for drop in drops)
     no_columns = _LISTS if struck else (*_LISTS, "incline_deg", "impact_chain")
 
     def row(record: Mapping[str, Any]) -> dict[str, object]:
@@ -90,19 +91,19 @@ def result_tables(analysis: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]
     def names(run: Mapping[str, Any]) -> dict[str, object]:
         return {key: run[key] for key in ("session", "run", "attempt") if key in run}
 
-    runs = [row(run) for run in latest]
+    runs = [row(drop) for drop in drops]
     if superseded:
-        runs = [{**run, "superseded": 0} for run in runs]
-        runs += [{**row(run), "superseded": 1} for run in superseded]
-        runs.sort(key=lambda run: (run.get("run", 0), run.get("attempt", 0)))
+        for place, run in enumerate(runs):
+            run["superseded"] = int(place >= len(latest))
+        runs.sort(key=lambda run: (run["run"], run["attempt"]))
     gates = [{**names(run), **flatten(gate)} for run in latest for gate in run.get("gates", ())]
     return {
         "runs": runs,
-        "summary": [row(line) for line in analysis.get("summary", [])],
+        "summary": [row(line) for line in analysis["summary"]],
         "budget": [
             names(run) | {"quantity": line["quantity"], "source": line["name"], "u": line["u"]}
-            for run in (*latest, *superseded)
-            for line in run.get("budget", [])
+            for run in drops
+            for line in run["budget"]
         ],
         **({"gates": gates} if gates else {}),
     }
