@@ -6,7 +6,7 @@ it is, what it is called, how it reads and what to do about it.
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import PurePath
 from string import Formatter
 from typing import Any, TypeVar
@@ -62,7 +62,7 @@ class Reason:
 
     def record(self) -> dict[str, Any]:
         """Return it with its sentence, for a log; `read_record` takes it back."""
-        return {**self.json(), "text": self.text, "scene": self.scene}
+        return asdict(self)
 
 
 def read_record(record: object) -> Reason:

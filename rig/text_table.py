@@ -57,9 +57,7 @@ def csv_text(rows: Collection[Mapping[str, object]], columns: Iterable[str] = ()
 def _signs_aligned(column: Sequence[str]) -> list[str]:
     """Pad what is behind ``±`` so that the signs stand under each other, but for the heading's."""
     heading, *cells = column
-    behind = max((len(cell.partition("±")[2]) for cell in cells), default=0)
-    padded = []
-    for cell in cells:
-        before, sign, after = cell.partition("±")
-        padded.append(f"{before}±{after.ljust(behind)}" if sign else cell)
+    lengths = [len(cell.partition("±")[2]) for cell in cells]
+    gaps = (max(lengths, default=0) - length for length in lengths)
+    padded = (cell + " " * gap * ("±" in cell) for cell, gap in zip(cells, gaps, strict=True))
     return [heading, *padded]

@@ -55,10 +55,10 @@ class BoardPage:
         news
             What the daemon told last: the path of its latest session, and the drop in hand.
         """
-        session = news.get("session")
-        if session and (self._live is None or self._live.path != Path(session)):
-            self._live, self._seen = LiveAnalysis(Path(session)), None
-            return self._template.render(title=f"{self._live.path.name} is being read …")
+        path = Path(news["session"]) if news.get("session") else None
+        if path is not None and (self._live is None or self._live.path != path):
+            self._live, self._seen = LiveAnalysis(path), None
+            return self._template.render(title=f"{path.name} is being read …")
         # A session that was closed stays on the page.
         seen = news, self._live and file_stamp(self._live.path)
         if seen == self._seen:
