@@ -44,8 +44,7 @@ def sign(files: Mapping[str, bytes], secret: SecretKey) -> dict[str, bytes]:
 
     The same files and key give the same bytes.
     """
-    rest = {name: files[name] for name in files if name != SUMS}
-    signed = list_hashes({**rest, PUBLIC_KEY: _text(secret.get_public_key())})
+    signed = list_hashes({**files, PUBLIC_KEY: _text(secret.get_public_key())})
     signature = secret.sign(signed[SUMS], untrusted_comment=_COMMENT, trusted_comment=_COMMENT)
     return {**signed, SIGNATURE: _text(signature)}
 

@@ -124,11 +124,8 @@ def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
     """
     columns: dict[str, object] = {}
     for key, value in record.items():
-        name = prefix + key
-        if isinstance(value, dict) and "value" in value:
-            columns[name] = value["value"]
-            columns |= {f"{name}_{part}": value[part] for part in ("u", "U95") if part in value}
-        elif isinstance(value, dict):
+        name = prefix.removesuffix("_") if key == "value" else prefix + key
+        if isinstance(value, dict):
             columns |= flatten(value, f"{name}_")
         elif isinstance(value, list):
             if dict not in map(type, value):
