@@ -109,13 +109,11 @@ _WORDS: dict[str, dict[str, Any]] = {
     "yes-no": {"action": argparse.BooleanOptionalAction},
     "append": {"action": "append"},
     "required": {"required": True},
-    "?": {"nargs": "?"},
-    "*": {"nargs": "*"},
-    "+": {"nargs": "+"},
 }
-"""What the words of the page's second column mean to argparse, beside ``=DEFAULT``, ``{CHOICES}``
-and kinds of values; of several with ``either`` at most one is accepted, of ``one-of`` just one.
-``with:NAME`` and ``without:NAME`` say what an argument has no use without, and beside what."""
+"""What the words of the page's second column mean to argparse, beside ``=DEFAULT``, ``{CHOICES}``,
+how often it stands (``?``, ``*`` or ``+``) and kinds of values; of several with ``either`` at most
+one is accepted, of ``one-of`` just one. ``with:NAME`` and ``without:NAME`` say what an argument has
+no use without, and beside what."""
 
 
 def _add_argument(parser: Parser, row: str, kinds: dict[str, dict[str, Any]]) -> None:
@@ -136,6 +134,8 @@ def _add_argument(parser: Parser, row: str, kinds: dict[str, dict[str, Any]]) ->
         elif word.startswith("{"):
             accepted = word.strip("{}").split(",")
             options |= {"choices": [*map(_number, accepted)], "type": _number}
+        elif word in {"?", "*", "+"}:
+            options["nargs"] = word
         elif kind in {"with", "without"}:
             rules += [(kind, other) for other in detail.split(",")]
         elif kind in {"either", "one-of"}:
