@@ -160,21 +160,7 @@ def _label(reason: Reason) -> str:
     return f"{label} ({words})" if words else label
 
 
-class _Writer(Formatter):
-    """Writes ``more|less`` by sign, ``.1f mm`` of metres, and how many there are of a ``run``."""
-
-    def format_field(self, value: Any, spec: str) -> str:
-        if "|" in spec:
-            return spec.split("|")[bool(value <= 0.0)]
-        digits, _, unit = spec.partition(" ")
-        if unit:
-            return f"{value * 1e3:{digits}} {unit}"
-        if len(spec) > 1 and spec.isalpha():
-            return f"{value} {spec}{'s' * (value != 1)}"
-        return format(value, spec)
-
-
-class _Phrases(dict[str, Any]):
+class _Phrases(dict[str, Any], Formatter):
     """What may stand in a sentence: values, words of the scene, and phrases made of both."""
 
     def __init__(self, values: Mapping[str, Any], words: Vocabulary) -> None:
@@ -185,9 +171,20 @@ class _Phrases(dict[str, Any]):
         phrase = _PHRASES.get(name)
         return getattr(self.words, name) if phrase is None else phrase(self)
 
+    def format_field(self, value: Any, spec: str) -> str:
+        """Write ``more|less`` by sign, ``.1f mm`` of metres, how many there are of a ``run``."""
+        if "|" in spec:
+            return spec.split("|")[bool(value <= 0.0)]
+        digits, _, unit = spec.partition(" ")
+        if unit:
+            return f"{value * 1e3:{digits}} {unit}"
+        if len(spec) > 1 and spec.isalpha():
+            return f"{value} {spec}{'s' * (value != 1)}"
+        return format(value, spec)
+
     def fill(self, sentence: str) -> str:
         """Return a sentence with all that it names."""
-        return _Writer().vformat(sentence, (), self)
+        return self.vformat(sentence, (), self)
 
 
 def _gate(gate: Mapping[str, Any], words: Vocabulary) -> str:
