@@ -57,20 +57,27 @@ def predict_incline(protocol: Protocol, incline_deg: float, struck: str) -> Pred
     assert protocol.surface is not None
     chain, drop = as_struck(protocol, incline_deg, struck)
     kappas = air_of(protocol, struck)
-    drag_u = 0.0 if protocol.drag is None else protocol.drag.relative_u
     model = predict(
         *(chain, protocol.surface, incline_deg, drop, protocol.gravity),
         initial_speed=protocol.initial_speed,
         kappas=kappas,
-        drag_u=drag_u,
+        drag_u=0.0 if protocol.drag is None else protocol.drag.relative_u,
     )
     free = next((name for name in protocol.chains if name != struck), None)
     if free is None or model.separation_m is None or model.fall_time_s is None:
         return model
-    # Top rods of unlike chains start at unlike heights.
+    # Top rods of unlike chains start at unlike heights, and the air holds them back unlike.
     longer = protocol.chains[free].chain.length - protocol.chains[struck].chain.length
-    held = _held_back(protocol, kappas, air_of(protocol, free), model.fall_time_s)
-    return replace(model, separation_m=model.separation_m + longer + held)
+    higher, free_kappas = 0.0, air_of(protocol, free)
+    if kappas[:1] != free_kappas[:1]:
+        from rig.model.drag import fallen  # noqa: PLC0415 - only where there is air
+
+        gravity, start = protocol.gravity.value, protocol.initial_speed.value
+        way, free_way = (
+            fallen(model.fall_time_s, gravity, air[0], start) for air in (kappas, free_kappas)
+        )
+        higher = way - free_way
+    return replace(model, separation_m=model.separation_m + longer + higher)
 
 
 def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
@@ -201,16 +208,3 @@ def _kappas(
     drags = [cylinder_drag(coefficient, density, d, length, rods.tilt_deg) for d in rods.diameters]
     volumes = tuple(d * d * length for d in rods.diameters)
     return leg_drags(rods.chain if weighed else replace(rods.chain, masses=volumes), drags)
-
-
-def _held_back(
-    protocol: Protocol, kappas: Sequence[float], its_kappas: Sequence[float], time: float
-) -> float:
-    """How much less far the free chain falls than the first one would beside it, m."""
-    if kappas[:1] == its_kappas[:1]:
-        return 0.0
-    from rig.model.drag import fallen  # noqa: PLC0415 - only where there is air
-
-    gravity, start = protocol.gravity.value, protocol.initial_speed.value
-    first, second = (fallen(time, gravity, chain[0], start) for chain in (kappas, its_kappas))
-    return first - second

@@ -20,17 +20,14 @@ def text_table(
     rule
         Whether a line is drawn below the headings.
     """
-    columns = [_signs_aligned(column) for column in zip(*rows, strict=True)]
-    widths = [max(map(len, column)) for column in columns]
-    lines = [
-        "  ".join(
-            cell.ljust(width) if n in left else cell.rjust(width)
-            for n, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in zip(*columns, strict=True)
-    ]
+    columns = []
+    for n, column in enumerate(zip(*rows, strict=True)):
+        cells = _signs_aligned(column)
+        width = max(map(len, cells))
+        columns.append([cell.ljust(width) if n in left else cell.rjust(width) for cell in cells])
+    lines = ["  ".join(row).rstrip() for row in zip(*columns, strict=True)]
     if rule:
-        lines.insert(1, "  ".join("─" * width for width in widths))
+        lines.insert(1, "  ".join("─" * len(heading) for heading, *_ in columns))
     return lines
 
 
