@@ -170,7 +170,7 @@ def air_of(protocol: Protocol, name: str) -> list[float]:
     if drag.coefficient is None:
         assert drag.terminal_speed is not None
         return [protocol.gravity.value / drag.terminal_speed.value**2] * rods.chain.rods
-    return _kappas(rods, rods.rod_length, drag.coefficient.value, drag.air_density)
+    return _kappas(rods, rods.rod_length, (drag.coefficient.value, drag.air_density))
 
 
 def air_shares(protocol: Protocol) -> dict[str, list[float]]:
@@ -187,7 +187,7 @@ def air_shares(protocol: Protocol) -> dict[str, list[float]]:
     measured = all(rods.rod_length for rods in chains)
     weighed = measured and all(rods.weighed for rods in chains)
     shares = {
-        name: _kappas(rods, rods.rod_length if measured else 1.0, weighed=weighed)
+        name: _kappas(rods, rods.rod_length if measured else 1.0, (1.0, 1.0), weighed=weighed)
         for name, rods in protocol.chains.items()
     }
     first = next(iter(shares.values()))[0]
@@ -195,16 +195,17 @@ def air_shares(protocol: Protocol) -> dict[str, list[float]]:
 
 
 def _kappas(
-    rods: RodChain,
-    length: float,
-    coefficient: float = 1.0,
-    density: float = 1.0,
-    *,
-    weighed: bool = True,
+    rods: RodChain, length: float, air: tuple[float, float], *, weighed: bool = True
 ) -> list[float]:
-    """Width over mass of all rods from each one up, by the masses given or by those of volumes."""
+    """Width over mass of all rods from each one up, by the masses given or by those of volumes.
+
+    Parameters
+    ----------
+    air
+        Drag coefficient, and density.
+    """
     from rig.model.drag import cylinder_drag, leg_drags  # noqa: PLC0415 - only where there is air
 
-    drags = [cylinder_drag(coefficient, density, d, length, rods.tilt_deg) for d in rods.diameters]
+    drags = [cylinder_drag(*air, d, length, rods.tilt_deg) for d in rods.diameters]
     volumes = tuple(d * d * length for d in rods.diameters)
     return leg_drags(rods.chain if weighed else replace(rods.chain, masses=volumes), drags)

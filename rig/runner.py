@@ -203,7 +203,10 @@ class Campaign:
                 case machine.Collect(job):
                     self.rig.collect(*job)
                 case machine.Judge(job):
-                    return self._judge(job)
+                    drop = self.rig.collect(*job)  # as it is in the session
+                    with self.interrupts.let_through():
+                        result = self._result = self.live.judge(self.session, drop)
+                    return machine.DropVerdict(self.flow.ticket, result.verdict, result.reasons)
                 case machine.Log(job, state, reasons):
                     self.rig.log_state(*job, RunState(state), reasons)
                     self.operator.say(sentence("drop", self._result, len(self.plan)))
@@ -215,12 +218,6 @@ class Campaign:
                 self._stop("interrupted by the operator")
             raise
         return machine.EffectDone(self.flow.ticket, token)
-
-    def _judge(self, job: Job) -> Event:
-        drop = self.rig.collect(*job)  # as it is in the session
-        with self.interrupts.let_through():
-            result = self._result = self.live.judge(self.session, drop)
-        return machine.DropVerdict(self.flow.ticket, result.verdict, result.reasons)
 
     def _stop(self, why: str) -> None:
         with suppress(DeviceError):

@@ -147,7 +147,7 @@ def _readme(session: Reader, tables: Mapping[str, str]) -> str:
 
 def _describe(table: str, column: str) -> str:
     unit, meaning = describe_column(table, column)
-    words = " ".join(filter(None, [unit and f"[{unit}]", meaning]))
+    words = f"[{unit}] {meaning}".removeprefix("[] ").rstrip()
     return words and f": {words}"
 
 
