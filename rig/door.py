@@ -24,7 +24,7 @@ from rig.analysis.result import GOOD, DropResult, Measured, optional_package
 from rig.analysis.summary import Incline
 from rig.bundle.tables import column_unit, result_tables
 from rig.errors import InputError
-from rig.measurands import MEASURANDS, told
+from rig.measurands import MEASURANDS
 from rig.model.prediction import PredictedIncline
 from rig.predictions import predictions
 from rig.protocol import reader
@@ -250,8 +250,9 @@ class _Quantities:
         self.quantities = quantities
 
     def _written(self) -> str:
-        values = self.quantities
-        return ", ".join(f"{row.symbol} {with_unit(values[row.name], row)}" for row in told(values))
+        rows = ((MEASURANDS[name], value) for name, value in self.quantities.items())
+        parts = (f"{row.symbol} {with_unit(x, row)}" for row, x in rows if "told" in row.kinds)
+        return ", ".join(parts)
 
 
 class RunResult(_Quantities):
