@@ -47,18 +47,14 @@ def copy_session(session: Reader) -> bytes:
 
 
 def bundle_files(
-    session: Reader,
-    data: bytes,
-    results: SessionResults,
-    drawn: Mapping[str, bytes],
-    history: Sequence[str],
+    session: Reader, results: SessionResults, drawn: Mapping[str, bytes], history: Sequence[str]
 ) -> dict[str, bytes]:
     """Make all files of a bundle.
 
     Parameters
     ----------
-    session, data
-        The session file of the bundle, open, and its bytes.
+    session
+        The session file of the bundle, open.
     results
         Of it.
     drawn
@@ -85,7 +81,7 @@ def bundle_files(
         "tables/datapackage.json": to_json(data_package(tables)),
         RESULTS: to_json(results.json()),
         ENVIRONMENT: to_json(environment()),
-        SESSION: data,
+        SESSION: session.path.read_bytes(),
     }
     for number, attached in enumerate(session.attached_files(), 1):
         name = re.sub(r"[^\w.-]+", "_", attached.name)
