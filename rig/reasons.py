@@ -9,14 +9,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import PurePath
 from string import Formatter
-from typing import Any, TypeVar
+from typing import Any
 
 from rig.errors import RigError
 from rig.units import Quantity, format_quantity
 from rig.vocabulary import ANY_SCENE, VOCABULARIES, Vocabulary
 from rig.wordings import LOOK, NOTE, SENTENCE, WORDINGS, Severity
-
-Failure = TypeVar("Failure", bound=RigError)
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +108,7 @@ def _plain_value(value: object) -> object:
     return str(text) if isinstance(value, Exception | PurePath) else value
 
 
-def error_of(kind: type[Failure], reason: Reason) -> Failure:
+def error_of(kind: type[RigError], reason: Reason) -> RigError:
     """Make an error of a reason."""
     error = kind(reason.text, *remedies([reason]))
     error.reasons = (reason,)

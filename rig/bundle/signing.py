@@ -4,7 +4,7 @@ import os
 import sys
 from collections.abc import Callable, Mapping
 from getpass import getpass
-from typing import TypeVar
+from typing import Any
 
 from minisign import Error, PublicKey, SecretKey, Signature
 
@@ -13,7 +13,6 @@ from rig.bundle.contents import WRONG
 from rig.files import read_input
 from rig.reasons import rig_error
 
-Key = TypeVar("Key")
 _COMMENT = "rig export --bundle"
 _LONGEST = 4096
 """Bytes of a key file; minisign writes fewer than 300."""
@@ -72,7 +71,7 @@ def check_signature(files: Mapping[str, bytes], key: str | os.PathLike[str] | No
     return f"signature: right, by the key {public.to_base64().decode()} ({whose})"
 
 
-def _read_key(path: str | os.PathLike[str], read: Callable[[bytes], Key]) -> Key:
+def _read_key(path: str | os.PathLike[str], read: Callable[[bytes], Any]) -> Any:
     """Read a key file; minisign's complaints about it become ours."""
     try:
         return read(read_input(path, _LONGEST))
