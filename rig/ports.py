@@ -3,7 +3,7 @@
 from pathlib import Path
 from urllib.parse import SplitResult, parse_qsl, urlencode, urlsplit
 
-from rig.reasons import rig_error
+from rig.reasons import errors_become, rig_error
 
 _SIMULATED = {"sim": "seed=3", "emu": "board=mega"}
 """URL schemes behind which no real chain falls, each with an example of a setting."""
@@ -106,10 +106,8 @@ def truth_file(session: Path) -> Path:
 
 
 def _split(url: str) -> SplitResult:
-    try:
+    with errors_become("not_a_port", ValueError, port=url):
         return urlsplit(url)
-    except ValueError as error:
-        raise rig_error("not_a_port", port=url, text=error) from None
 
 
 def _with_settings(url: str, settings: dict[str, str], **usual: str) -> str:

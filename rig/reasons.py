@@ -5,7 +5,8 @@ it is, what it is called, how it reads and what to do about it.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import PurePath
 from string import Formatter
@@ -101,6 +102,15 @@ def rig_error(code: str, /, **values: Any) -> RigError:
     """
     words = {name: _plain_value(value) for name, value in values.items()}
     return error_of(WORDINGS[code].error, make_reason(code, **words))
+
+
+@contextmanager
+def errors_become(code: str, *kinds: type[Exception], **values: Any) -> Iterator[None]:
+    """Turn errors of some kinds in a block into that of a code; their words are its ``text``."""
+    try:
+        yield
+    except kinds as error:
+        raise rig_error(code, **values, text=error) from error
 
 
 def _plain_value(value: object) -> object:

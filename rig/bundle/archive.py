@@ -17,7 +17,7 @@ from pathlib import Path
 from rig import __version__
 from rig.errors import RigError
 from rig.files import read_input
-from rig.reasons import rig_error
+from rig.reasons import errors_become, rig_error
 from rig.text_rows import read_text
 
 ROOT = "record/"
@@ -175,10 +175,8 @@ def _check_archive(files: Mapping[str, bytes], data: bytes) -> list[str]:
 
 
 def _read(path: Path) -> bytes:
-    try:
+    with errors_become("bundle_unreadable", OSError, path=path):
         data = read_input(path, _LARGEST + 1)
-    except OSError as error:
-        raise rig_error("bundle_unreadable", path=path, text=error) from error
     if len(data) > _LARGEST:
         raise _foreign(path, f"it has more than {_LARGEST} bytes")
     return data

@@ -11,7 +11,7 @@ from minisign import Error, PublicKey, SecretKey, Signature
 from rig.bundle.archive import PUBLIC_KEY, SIGNATURE, SUMS, list_hashes
 from rig.bundle.contents import WRONG
 from rig.files import read_input
-from rig.reasons import rig_error
+from rig.reasons import errors_become, rig_error
 
 _COMMENT = "rig export --bundle"
 _LONGEST = 4096
@@ -73,10 +73,8 @@ def check_signature(files: Mapping[str, bytes], key: str | os.PathLike[str] | No
 
 def _read_key(path: str | os.PathLike[str], read: Callable[[bytes], Any]) -> Any:
     """Read a key file; minisign's complaints about it become ours."""
-    try:
+    with errors_become("key_unusable", OSError, Error, path=path):
         return read(read_input(path, _LONGEST))
-    except (OSError, Error) as error:
-        raise rig_error("key_unusable", path=path, text=error) from error
 
 
 def _text(part: object) -> bytes:
