@@ -176,8 +176,7 @@ class _Phrases(dict[str, Any], Formatter):
         self.words = words
 
     def __missing__(self, name: str) -> object:
-        phrase = _PHRASES.get(name)
-        return getattr(self.words, name) if phrase is None else phrase(self)
+        return _PHRASES[name](self) if name in _PHRASES else getattr(self.words, name)
 
     def format_field(self, value: Any, spec: str) -> str:
         """Write ``more|less`` by sign, ``.1f mm`` of metres, how many there are of a ``run``."""
@@ -212,10 +211,9 @@ def _side(phrases: _Phrases) -> str:
 
 
 def _chain(phrases: _Phrases) -> str:
-    name = phrases["name"]
     if phrases.words.part != "rod":
         return phrases.words.body
-    return f"chain {name}" if name else "each chain"
+    return f"chain {phrases['name']}" if phrases["name"] else "each chain"
 
 
 def _each_part(phrases: _Phrases) -> str:

@@ -116,8 +116,8 @@ def result_tables(analysis: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]
 def column_unit(column: str) -> str:
     """Return the unit of a table's column, by the end of its name; empty where there is none."""
     name = column.removesuffix("_U95").removesuffix("_u")
-    ends = (end for end in _ROWS if end.startswith("_") and name.endswith(end))
-    return _ROWS.get(next(ends, ""), "")
+    units = (unit for end, unit in _ROWS.items() if end[0] == "_" and name.endswith(end))
+    return next(units, "")
 
 
 def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
