@@ -10,7 +10,7 @@ __all__ = ["__version__", "open", "predict", "read_protocol"]
 
 def __getattr__(name: str) -> object:
     """Load the door when somebody comes to it."""
-    if name not in {"open", "predict", "read_protocol"}:
+    if name not in __all__:
         raise AttributeError(f"module 'rig' has no attribute {name!r}; it offers {__all__}")
     from importlib import import_module  # noqa: PLC0415 - `rig --help` needs none of this
 

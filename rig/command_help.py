@@ -88,11 +88,6 @@ class Parser(argparse.ArgumentParser):
         """Return the help of a command, or the first help."""
         return super().format_help() if self.prog != "rig" else first_help()
 
-    def group(self, *, needed: bool) -> argparse._MutuallyExclusiveGroup:
-        """Return the group of arguments of which at most one is accepted."""
-        groups = self._mutually_exclusive_groups
-        return groups[0] if groups else self.add_mutually_exclusive_group(required=needed)
-
     def _check_value(self, action: argparse.Action, value: object) -> None:
         if action.choices is not None and value not in action.choices:
             from rig.units import did_you_mean  # noqa: PLC0415 - only a mistake needs it
@@ -114,13 +109,11 @@ _WORDS: dict[str, dict[str, Any]] = {
     "yes-no": {"action": argparse.BooleanOptionalAction},
     "append": {"action": "append"},
     "required": {"required": True},
-    "?": {"nargs": "?"},
-    "*": {"nargs": "*"},
-    "+": {"nargs": "+"},
 }
-"""What the words of the page's second column mean to argparse, beside ``=DEFAULT``, ``{CHOICES}``
-and kinds of values; of several with ``either`` at most one is accepted, of ``one-of`` just one.
-``with:NAME`` and ``without:NAME`` say what an argument has no use without, and beside what."""
+"""What the words of the page's second column mean to argparse, beside ``=DEFAULT``, ``{CHOICES}``,
+how often it stands (``?``, ``*`` or ``+``) and kinds of values; of several with ``either`` at most
+one is accepted, of ``one-of`` just one. ``with:NAME`` and ``without:NAME`` say what an argument has
+no use without, and beside what."""
 
 
 def _add_argument(parser: Parser, row: str, kinds: dict[str, dict[str, Any]]) -> None:
@@ -141,10 +134,14 @@ def _add_argument(parser: Parser, row: str, kinds: dict[str, dict[str, Any]]) ->
         elif word.startswith("{"):
             accepted = word.strip("{}").split(",")
             options |= {"choices": [*map(_number, accepted)], "type": _number}
+        elif word in {"?", "*", "+"}:
+            options["nargs"] = word
         elif kind in {"with", "without"}:
             rules += [(kind, other) for other in detail.split(",")]
         elif kind in {"either", "one-of"}:
-            place = parser.group(needed=kind == "one-of")
+            if not parser._mutually_exclusive_groups:
+                parser.add_mutually_exclusive_group(required=kind == "one-of")
+            (place,) = parser._mutually_exclusive_groups
         else:
             options |= kinds[kind]
             if detail:

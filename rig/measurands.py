@@ -57,7 +57,7 @@ class Measurand(NamedTuple):
 
     def key(self, what: str) -> str:
         """Name something of it: ``sd`` of ``speed_m_s`` is ``speed_sd_m_s``."""
-        return f"{self.stem}_{what}{self.name.removeprefix(self.stem)}"
+        return _UNIT.sub(rf"_{what}\g<0>", self.name)
 
     @property
     def axis(self) -> str:

@@ -3,18 +3,17 @@
 from pathlib import Path
 from urllib.parse import SplitResult, parse_qsl, urlencode, urlsplit
 
-from rig.reasons import rig_error
+from rig.reasons import errors_become, rig_error
 
-SIMULATED = ("sim", "emu")
-"""URL schemes behind which no real chain falls."""
-_EXAMPLES = {"sim": "seed=3", "emu": "board=mega"}
+_SIMULATED = {"sim": "seed=3", "emu": "board=mega"}
+"""URL schemes behind which no real chain falls, each with an example of a setting."""
 _BYTES = "surrogateescape"  # a file's name need not be UTF-8
 _FILES = {"protocol", "truth"}
 
 
 def is_simulated(url: str) -> bool:
     """Whether data from this port must be stamped as simulated."""
-    return _split(url).scheme in SIMULATED
+    return _split(url).scheme in _SIMULATED
 
 
 def fill_url(url: str, protocol: Path, session: Path, seed: int | None, before: str = "") -> str:
@@ -71,8 +70,8 @@ def check_name(url: str) -> None:
     """
     parts = _split(url)
     extra = parts.netloc + parts.path or (parts.fragment and f"#{parts.fragment}")
-    if extra and parts.scheme in SIMULATED:
-        example = f"{parts.scheme}://?{_EXAMPLES[parts.scheme]}"
+    if extra and parts.scheme in _SIMULATED:
+        example = f"{parts.scheme}://?{_SIMULATED[parts.scheme]}"
         raise rig_error("url_unexpected", url=url, extra=extra, example=example)
 
 
@@ -107,10 +106,8 @@ def truth_file(session: Path) -> Path:
 
 
 def _split(url: str) -> SplitResult:
-    try:
+    with errors_become("not_a_port", ValueError, port=url):
         return urlsplit(url)
-    except ValueError as error:
-        raise rig_error("not_a_port", port=url, text=error) from None
 
 
 def _with_settings(url: str, settings: dict[str, str], **usual: str) -> str:

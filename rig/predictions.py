@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from rig.measurands import ACCELERATION, FALL_TIME, GRAVITY, SEPARATION, SPEED, Measurand
+from rig.model.fall import air_legs
 from rig.model.prediction import PredictedIncline
 from rig.protocol.contact import as_struck, at_contact
 from rig.units import Quantity
@@ -56,20 +57,27 @@ def predict_incline(protocol: Protocol, incline_deg: float, struck: str) -> Pred
     assert protocol.surface is not None
     chain, drop = as_struck(protocol, incline_deg, struck)
     kappas = air_of(protocol, struck)
-    drag_u = 0.0 if protocol.drag is None else protocol.drag.relative_u
     model = predict(
         *(chain, protocol.surface, incline_deg, drop, protocol.gravity),
         initial_speed=protocol.initial_speed,
         kappas=kappas,
-        drag_u=drag_u,
+        drag_u=0.0 if protocol.drag is None else protocol.drag.relative_u,
     )
     free = next((name for name in protocol.chains if name != struck), None)
     if free is None or model.separation_m is None or model.fall_time_s is None:
         return model
-    # Top rods of unlike chains start at unlike heights.
+    # Top rods of unlike chains start at unlike heights, and the air holds them back unlike.
     longer = protocol.chains[free].chain.length - protocol.chains[struck].chain.length
-    held = _held_back(protocol, kappas, air_of(protocol, free), model.fall_time_s)
-    return replace(model, separation_m=model.separation_m + longer + held)
+    higher, free_kappas = 0.0, air_of(protocol, free)
+    if kappas[:1] != free_kappas[:1]:
+        from rig.model.drag import fallen  # noqa: PLC0415 - only where there is air
+
+        gravity, start = protocol.gravity.value, protocol.initial_speed.value
+        way, free_way = (
+            fallen(model.fall_time_s, gravity, air[0], start) for air in (kappas, free_kappas)
+        )
+        higher = way - free_way
+    return replace(model, separation_m=model.separation_m + longer + higher)
 
 
 def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
@@ -140,14 +148,7 @@ def _free_fall(protocol: Protocol) -> PredictedIncline:
     ((name, rods),) = protocol.chains.items()
     length = protocol.drop.value + rods.chain.length
     start, gravity = protocol.initial_speed.value, protocol.gravity.value
-    if protocol.drag is None:
-        from rig.model.fall import free_leg  # noqa: PLC0415 - all that this scene needs
-
-        speed, time = free_leg(length, start, gravity)
-    else:
-        from rig.model.drag import drag_leg  # noqa: PLC0415 - only where there is air
-
-        speed, time = drag_leg(length, start, gravity, air_of(protocol, name)[0])
+    speed, time = air_legs(air_of(protocol, name))(length, start, gravity, 0)
     scene = "free fall" if protocol.track is None else "track"
     return PredictedIncline(
         incline_deg=0.0,
@@ -169,7 +170,7 @@ def air_of(protocol: Protocol, name: str) -> list[float]:
     if drag.coefficient is None:
         assert drag.terminal_speed is not None
         return [protocol.gravity.value / drag.terminal_speed.value**2] * rods.chain.rods
-    return _kappas(rods, rods.rod_length, drag.coefficient.value, drag.air_density)
+    return _kappas(rods, rods.rod_length, (drag.coefficient.value, drag.air_density))
 
 
 def air_shares(protocol: Protocol) -> dict[str, list[float]]:
@@ -186,7 +187,7 @@ def air_shares(protocol: Protocol) -> dict[str, list[float]]:
     measured = all(rods.rod_length for rods in chains)
     weighed = measured and all(rods.weighed for rods in chains)
     shares = {
-        name: _kappas(rods, rods.rod_length if measured else 1.0, weighed=weighed)
+        name: _kappas(rods, rods.rod_length if measured else 1.0, (1.0, 1.0), weighed=weighed)
         for name, rods in protocol.chains.items()
     }
     first = next(iter(shares.values()))[0]
@@ -194,29 +195,17 @@ def air_shares(protocol: Protocol) -> dict[str, list[float]]:
 
 
 def _kappas(
-    rods: RodChain,
-    length: float,
-    coefficient: float = 1.0,
-    density: float = 1.0,
-    *,
-    weighed: bool = True,
+    rods: RodChain, length: float, air: tuple[float, float], *, weighed: bool = True
 ) -> list[float]:
-    """Width over mass of all rods from each one up, by the masses given or by those of volumes."""
+    """Width over mass of all rods from each one up, by the masses given or by those of volumes.
+
+    Parameters
+    ----------
+    air
+        Drag coefficient, and density.
+    """
     from rig.model.drag import cylinder_drag, leg_drags  # noqa: PLC0415 - only where there is air
 
-    drags = [cylinder_drag(coefficient, density, d, length, rods.tilt_deg) for d in rods.diameters]
+    drags = [cylinder_drag(*air, d, length, rods.tilt_deg) for d in rods.diameters]
     volumes = tuple(d * d * length for d in rods.diameters)
     return leg_drags(rods.chain if weighed else replace(rods.chain, masses=volumes), drags)
-
-
-def _held_back(
-    protocol: Protocol, kappas: Sequence[float], its_kappas: Sequence[float], time: float
-) -> float:
-    """How much less far the free chain falls than the first one would beside it, m."""
-    if kappas[:1] == its_kappas[:1]:
-        return 0.0
-    from rig.model.drag import fallen  # noqa: PLC0415 - only where there is air
-
-    gravity, start = protocol.gravity.value, protocol.initial_speed.value
-    first, second = (fallen(time, gravity, chain[0], start) for chain in (kappas, its_kappas))
-    return first - second

@@ -45,8 +45,7 @@ def find_resource(name: str) -> Path:
     InputError
         Where this installation lacks it.
     """
-    here = Path(__file__).parent
-    path = next((path for folder in (here, here.parent) if (path := folder / name).exists()), None)
-    if path is None:
-        raise InputError(f"this installation has no {name}", "install chainrig again")
-    return path
+    for folder in Path(__file__).parents[:2]:
+        if (path := folder / name).exists():
+            return path
+    raise InputError(f"this installation has no {name}", "install chainrig again")

@@ -5,17 +5,17 @@ it is, what it is called, how it reads and what to do about it.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, field
 from pathlib import PurePath
-from typing import Any, TypeVar
+from string import Formatter
+from typing import Any
 
 from rig.errors import RigError
 from rig.units import Quantity, format_quantity
 from rig.vocabulary import ANY_SCENE, VOCABULARIES, Vocabulary
 from rig.wordings import LOOK, NOTE, SENTENCE, WORDINGS, Severity
-
-Failure = TypeVar("Failure", bound=RigError)
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class Reason:
 
     def record(self) -> dict[str, Any]:
         """Return it with its sentence, for a log; `read_record` takes it back."""
-        return {**self.json(), "text": self.text, "scene": self.scene}
+        return asdict(self)
 
 
 def read_record(record: object) -> Reason:
@@ -86,7 +86,7 @@ def plain_reason(text: str, code: str = SENTENCE) -> Reason:
 
 def make_reason(code: str, words: Vocabulary = ANY_SCENE, /, **values: Any) -> Reason:
     """Make a reason with its sentence in the words of a scene; values as in `Reason`."""
-    sentence = WORDINGS[code].sentence.format_map(_Phrases(values, words))
+    sentence = _Phrases(values, words).fill(WORDINGS[code].sentence)
     if "log_odds" in values:
         sentence += f" (odds {_odds(values['log_odds'])} to 1)"
     return Reason(code, values, sentence, words.scene)
@@ -104,12 +104,21 @@ def rig_error(code: str, /, **values: Any) -> RigError:
     return error_of(WORDINGS[code].error, make_reason(code, **words))
 
 
+@contextmanager
+def errors_become(code: str, *kinds: type[Exception], **values: Any) -> Iterator[None]:
+    """Turn errors of some kinds in a block into that of a code; their words are its ``text``."""
+    try:
+        yield
+    except kinds as error:
+        raise rig_error(code, **values, text=error) from error
+
+
 def _plain_value(value: object) -> object:
     text = getattr(value, "strerror", None) or value
     return str(text) if isinstance(value, Exception | PurePath) else value
 
 
-def error_of(kind: type[Failure], reason: Reason) -> Failure:
+def error_of(kind: type[RigError], reason: Reason) -> RigError:
     """Make an error of a reason."""
     error = kind(reason.text, *remedies([reason]))
     error.reasons = (reason,)
@@ -139,7 +148,7 @@ def reasons_json(
 def remedies(reasons: Iterable[Reason]) -> list[str]:
     """Return what to do about some reasons, each thing once; the general advice only if alone."""
     advice = [
-        WORDINGS[reason.code].remedy.format_map(_Phrases(reason.values, VOCABULARIES[reason.scene]))
+        _Phrases(reason.values, VOCABULARIES[reason.scene]).fill(WORDINGS[reason.code].remedy)
         for reason in reasons
     ]
     advice = [text for text in dict.fromkeys(advice) if text]
@@ -159,36 +168,30 @@ def _label(reason: Reason) -> str:
     return f"{label} ({words})" if words else label
 
 
-class _Number(float):
-    """A number that knows how its unit is written: ``.1f mm`` of metres, ``more|less`` by sign."""
-
-    def __format__(self, spec: str) -> str:
-        if "|" in spec:
-            return spec.split("|")[self <= 0.0]
-        digits, _, unit = spec.partition(" ")
-        return format(self * 1e3, digits) + f" {unit}" if unit else float.__format__(self, digits)
-
-
-class _Count(int):
-    """A whole number that knows how many there are of a noun: ``1 run``, ``3 runs``."""
-
-    def __format__(self, spec: str) -> str:
-        noun = f" {spec}" + "s" * (self != 1) if len(spec) > 1 and spec.isalpha() else ""
-        return f"{int(self)}{noun}" if noun else int.__format__(self, spec)
-
-
-class _Phrases(dict[str, Any]):
+class _Phrases(dict[str, Any], Formatter):
     """What may stand in a sentence: values, words of the scene, and phrases made of both."""
 
     def __init__(self, values: Mapping[str, Any], words: Vocabulary) -> None:
-        numbers = {n: _Number(v) for n, v in values.items() if isinstance(v, float)}
-        counts = {n: _Count(v) for n, v in values.items() if type(v) is int}
-        super().__init__({**values, **numbers, **counts})
+        super().__init__(values)
         self.words = words
 
     def __missing__(self, name: str) -> object:
-        phrase = _PHRASES.get(name)
-        return getattr(self.words, name) if phrase is None else phrase(self)
+        return _PHRASES[name](self) if name in _PHRASES else getattr(self.words, name)
+
+    def format_field(self, value: Any, spec: str) -> str:
+        """Write ``more|less`` by sign, ``.1f mm`` of metres, how many there are of a ``run``."""
+        if "|" in spec:
+            return spec.split("|")[bool(value <= 0.0)]
+        digits, _, unit = spec.partition(" ")
+        if unit:
+            return f"{value * 1e3:{digits}} {unit}"
+        if len(spec) > 1 and spec.isalpha():
+            return f"{value} {spec}{'s' * (value != 1)}"
+        return format(value, spec)
+
+    def fill(self, sentence: str) -> str:
+        """Return a sentence with all that it names."""
+        return self.vformat(sentence, (), self)
 
 
 def _gate(gate: Mapping[str, Any], words: Vocabulary) -> str:
@@ -208,10 +211,9 @@ def _side(phrases: _Phrases) -> str:
 
 
 def _chain(phrases: _Phrases) -> str:
-    name = phrases["name"]
     if phrases.words.part != "rod":
         return phrases.words.body
-    return f"chain {name}" if name else "each chain"
+    return f"chain {phrases['name']}" if phrases["name"] else "each chain"
 
 
 def _each_part(phrases: _Phrases) -> str:
@@ -222,9 +224,8 @@ def _each_part(phrases: _Phrases) -> str:
 
 
 def _format_measured(phrases: _Phrases, name: str) -> str:
-    speed = phrases.get(f"{name}_m_s")
-    value, unit = (phrases[f"{name}_m"], "mm") if speed is None else (speed, "m/s")
-    return format_quantity(Quantity(float(value), float(phrases[f"{name}_U95"])), unit)
+    end, unit = ("m_s", "m/s") if f"{name}_m_s" in phrases else ("m", "mm")
+    return format_quantity(Quantity(phrases[f"{name}_{end}"], phrases[f"{name}_U95"]), unit)
 
 
 _LEAST_MM = 0.1

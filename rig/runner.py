@@ -1,6 +1,5 @@
 """The headless runner: carries out a protocol's plan, drop by drop, on one session file."""
 
-from collections import deque
 from collections.abc import Callable
 from contextlib import closing, suppress
 from pathlib import Path
@@ -126,8 +125,8 @@ class Campaign:
         self.flow = Flow(Stage.DEVICE, countdown_s=0.0, attended=attended, row=row)
         self.live = LiveAnalysis(self.session.path)
         self._clock_u: float | None = None
-        self._result: DropResult | None = None  # of the drop judged last
-        self._failed: DeviceRefusedError | None = None
+        self._result: DropResult  # of the drop judged last
+        self._refusal: DeviceRefusedError  # the last one
 
     def carry_out(self) -> None:
         """Do every run that is not done yet, in order, unless voids show that it is no use.
@@ -137,9 +136,9 @@ class Campaign:
         DeviceError
             The device is in trouble, or refuses what nobody there can help.
         """
-        effects: deque[Effect] = deque()
+        effects: list[Effect] = []
         while effects or self.flow.stage not in {Stage.DONE, Stage.HALTED}:
-            event = self._carry_out(effects.popleft()) if effects else self._next()
+            event = self._carry_out(effects.pop(0)) if effects else self._next()
             if event is not None:
                 self.flow, wanted = step(self.flow, event)
                 effects += wanted
@@ -187,15 +186,14 @@ class Campaign:
 
         Once the release is fired this stays until the drop is recorded: preparing it took minutes.
         """
+        if isinstance(effect, machine.GiveUp):
+            raise self._refusal
         token = None
         try:
             match effect:
                 case machine.Stop(reason):
                     self._stop(reason)
                     return None
-                case machine.GiveUp():
-                    assert self._failed is not None
-                    raise self._failed
                 case machine.Wait(seconds):
                     self.rig.wait(seconds)
                 case machine.ArmRelease(job):
@@ -205,27 +203,21 @@ class Campaign:
                 case machine.Collect(job):
                     self.rig.collect(*job)
                 case machine.Judge(job):
-                    return self._judge(job)
+                    drop = self.rig.collect(*job)  # as it is in the session
+                    with self.interrupts.let_through():
+                        result = self._result = self.live.judge(self.session, drop)
+                    return machine.DropVerdict(self.flow.ticket, result.verdict, result.reasons)
                 case machine.Log(job, state, reasons):
                     self.rig.log_state(*job, RunState(state), reasons)
-                    assert self._result is not None
                     self.operator.say(sentence("drop", self._result, len(self.plan)))
         except DeviceRefusedError as refusal:
-            if refusal is self._failed:
-                raise
-            self._failed = refusal
+            self._refusal = refusal
             return machine.effect_failure(self.flow.ticket, refusal)
         except KeyboardInterrupt:
             if isinstance(effect, _FALL):
                 self._stop("interrupted by the operator")
             raise
         return machine.EffectDone(self.flow.ticket, token)
-
-    def _judge(self, job: Job) -> Event:
-        drop = self.rig.collect(*job)  # as it is in the session
-        with self.interrupts.let_through():
-            result = self._result = self.live.judge(self.session, drop)
-        return machine.DropVerdict(self.flow.ticket, result.verdict, result.reasons)
 
     def _stop(self, why: str) -> None:
         with suppress(DeviceError):

@@ -3,8 +3,6 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from rig.errors import RigError
-
 
 class Sections:
     """Makes the sections of one result.
@@ -34,13 +32,9 @@ class Sections:
         """
         try:
             yield
-        except ImportError:
-            raise
         except Exception as error:
-            if isinstance(error.__cause__, ImportError):
+            if any(isinstance(part, ImportError) for part in (error, error.__cause__)):
                 raise
             # A mistake in the program is to be seen for what it is.
-            why = (
-                error.message if isinstance(error, RigError) else f"{type(error).__name__}: {error}"
-            )
+            why = getattr(error, "message", f"{type(error).__name__}: {error}")
             self.failed[name] = f"{name} could not be made: {' '.join(why.split())}"

@@ -2,7 +2,8 @@
 
 import csv
 import io
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Collection, Container, Iterable, Mapping, Sequence
+from itertools import chain
 
 
 def text_table(
@@ -19,32 +20,32 @@ def text_table(
     rule
         Whether a line is drawn below the headings.
     """
-    columns = [_signs_aligned(column) for column in zip(*rows, strict=True)]
-    widths = [max(map(len, column)) for column in columns]
-    lines = [
-        "  ".join(
-            cell.ljust(width) if n in left else cell.rjust(width)
-            for n, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in zip(*columns, strict=True)
-    ]
+    columns = []
+    for n, column in enumerate(zip(*rows, strict=True)):
+        cells = _signs_aligned(column)
+        width = max(map(len, cells))
+        columns.append([cell.ljust(width) if n in left else cell.rjust(width) for cell in cells])
+    lines = ["  ".join(row).rstrip() for row in zip(*columns, strict=True)]
     if rule:
-        lines.insert(1, "  ".join("─" * width for width in widths))
+        lines.insert(1, "  ".join("─" * len(heading) for heading, *_ in columns))
     return lines
 
 
-def csv_text(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) -> str:
+def csv_text(rows: Collection[Mapping[str, object]], columns: Iterable[str] = ()) -> str:
     """Write rows as CSV below their columns' names.
 
     Parameters
     ----------
-    columns
-        What a row has beyond them is left out, what it lacks is empty.
     rows
         Values by column; floats get the digits that give the same float back.
+    columns
+        What a row has beyond them is left out, what it lacks is empty. By default all that any row
+        has, in the order of the fullest: a void run may lack some that later runs have.
     """
+    fullest = sorted(rows, key=len, reverse=True)
+    heading = [*columns] or [*dict.fromkeys(chain.from_iterable(fullest))]
     text = io.StringIO()
-    writer = csv.DictWriter(text, [*columns], extrasaction="ignore", lineterminator="\n")
+    writer = csv.DictWriter(text, heading, extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
     return text.getvalue()
@@ -53,9 +54,7 @@ def csv_text(columns: Iterable[str], rows: Iterable[Mapping[str, object]]) -> st
 def _signs_aligned(column: Sequence[str]) -> list[str]:
     """Pad what is behind ``±`` so that the signs stand under each other, but for the heading's."""
     heading, *cells = column
-    behind = max((len(cell.partition("±")[2]) for cell in cells), default=0)
-    padded = []
-    for cell in cells:
-        before, sign, after = cell.partition("±")
-        padded.append(f"{before}±{after.ljust(behind)}" if sign else cell)
+    lengths = [len(cell.partition("±")[2]) for cell in cells]
+    gaps = (max(lengths, default=0) - length for length in lengths)
+    padded = (cell + " " * gap * ("±" in cell) for cell, gap in zip(cells, gaps, strict=True))
     return [heading, *padded]

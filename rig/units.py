@@ -7,9 +7,11 @@ The number is scaled by an exact fraction and rounded once, so ``48.5 mm`` is th
 import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from contextlib import suppress
+from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
+from typing import NamedTuple
 
 from rig.text_rows import read_rows
 
@@ -43,8 +45,7 @@ class UnitError(ValueError):
     """A text is not the quantity that was asked for; says what was found and what is accepted."""
 
 
-@dataclass(frozen=True, slots=True)
-class Dimension:
+class Dimension(NamedTuple):
     """What a quantity measures, as its row of ``units.txt`` has it.
 
     Attributes
@@ -57,7 +58,7 @@ class Dimension:
 
     noun: str
     example: str
-    factors: Mapping[str, Fraction] = field(hash=False)
+    factors: Mapping[str, Fraction]
 
 
 def _dimension(noun: str, example: str, units: str) -> Dimension:
@@ -136,7 +137,7 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
     UnitError
         If the text is no such quantity; the message says what was found and what is accepted.
     """
-    text = repr(text) if isinstance(text, float) else str(text)
+    text = str(text)
     accepted_form = f"accepted: {dimension.noun}, such as {dimension.example}"
     clean = " ".join(text.split()).replace("−", "-")
     if len(clean) > _LONGEST:
@@ -150,7 +151,15 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
     parts = match.groupdict()
     unit, u_unit, u_number = parts["unit"], parts["u_unit"], parts["u"]
     if u_number is not None:
-        unit, u_unit = _shared_unit(clean, unit, u_unit)
+        if unit is not None and u_unit is None:
+            raise UnitError(f"found {quote(clean)}; the part after ± needs a unit too")
+        if unit is None and u_unit in _RELATIVE:
+            # "0.50 ± 10 %" is read by some as 10 % of 0.50 and by others as (0.50 ± 10) %.
+            raise UnitError(
+                f"found {quote(clean)}, which has two meanings; "
+                f"write both parts in the same unit: 0.50 ± 0.05 or 50 % ± 5 %"
+            )
+        unit = unit or u_unit
     factor = _factor(unit, dimension, clean)
     value = _scale(parts["value"], factor / int(parts["per"] or 1), clean)
     if parts["last"]:
@@ -166,19 +175,6 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
 def _match(text: str) -> re.Match[str] | None:
     """Match a quantity; a unit behind brackets is of both numbers in them."""
     return _PLAIN.fullmatch(_BRACKETED.sub(r"\1 \4 \2 \3 \4", text))
-
-
-def _shared_unit(text: str, unit: str | None, u_unit: str | None) -> tuple[str | None, str | None]:
-    """Return the units of a value and of what stands behind its ``±``."""
-    if unit is not None and u_unit is None:
-        raise UnitError(f"found {quote(text)}; the part after ± needs a unit too")
-    if unit is None and u_unit in _RELATIVE:
-        # "0.50 ± 10 %" is read by some as 10 % of 0.50 and by others as (0.50 ± 10) %.
-        raise UnitError(
-            f"found {quote(text)}, which has two meanings; "
-            f"write both parts in the same unit: 0.50 ± 0.05 or 50 % ± 5 %"
-        )
-    return unit or u_unit, u_unit
 
 
 def _factor(unit: str | None, dimension: Dimension, text: str) -> Fraction:
@@ -203,18 +199,14 @@ def _factor(unit: str | None, dimension: Dimension, text: str) -> Fraction:
 
 def _scale(number: str, factor: Fraction, text: str) -> float:
     """Return ``number × factor``, rounded once."""
-    try:
+    with suppress(ArithmeticError):
         exact = Decimal(number)
         if exact == 0:
             return 0.0
-        if abs(exact.adjusted()) > _LARGEST_EXPONENT:
-            raise OverflowError
-        result = float(Fraction(exact) * factor)
-    except ArithmeticError:
-        result = 0.0
-    if result == 0:
-        raise UnitError(f"found {quote(text)}, too large or too small")
-    return result
+        is_usual = abs(exact.adjusted()) <= _LARGEST_EXPONENT
+        if is_usual and (result := float(Fraction(exact) * factor)):
+            return result
+    raise UnitError(f"found {quote(text)}, too large or too small")
 
 
 def format_quantity(quantity: Quantity, unit: str) -> str:

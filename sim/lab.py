@@ -12,8 +12,7 @@ import numpy as np
 from rig.errors import InputError
 from rig.link.messages import TEST_RUN, unpack_label
 from rig.model.chain import Chain
-from rig.model.drag import air_legs
-from rig.model.fall import hits, kicks
+from rig.model.fall import air_legs, hits, kicks
 from rig.model.impact import impact_on
 from rig.model.surface import Surface
 from rig.protocol.contact import contact_level, higher_contacts

@@ -17,7 +17,7 @@ from rig.wordings import WORDINGS
 RIG = Path(__file__).parents[1] / "rig"
 RAISERS = {"make_reason": 0, "rig_error": 0, "plain_reason": 1, "problem": 1,
            "CheckFailedError": 0, "NotPossibleError": 0, "problems.add": 3, "_problems.add": 3,
-           "place.add": 1, "problems.refuse": 1, "refusal": 1}  # fmt: skip
+           "place.add": 1, "problems.refuse": 1, "refusal": 1, "errors_become": 0}  # fmt: skip
 """Functions that take a code, and which of their arguments it is."""
 REFUSED = {f"refused_{reason.name.lower()}" for reason in RefusalReason}
 SQLITE = {name.lower() for name in dir(sqlite3) if name.startswith("SQLITE_")}
@@ -110,7 +110,7 @@ def test_each_call_gives_what_its_sentence_and_remedy_need():
     lacking, parsed = {}, dict(trees())
     for path, code, call in raised_codes():
         values, unseen = given(call, parsed[path])
-        if "plain_reason" in ast.unparse(call.func):
+        if name_of(call.func) in {"plain_reason", "errors_become"}:
             values.add("text")
         if not unseen:  # by a name that no dictionary of the file has, ** may hold any
             wording = WORDINGS[code]

@@ -141,8 +141,8 @@ def _make(folder: Path, repeats: int, only: str) -> tuple[list[Row], list[Row]]:
             for fall, _ in session.drops.values()
         ]
     tables = {
-        "truth/truth.csv": csv_text(["session", *_columns()], truths),
-        "readings.csv": csv_text(["entrant", *_KEY, "quantity", "value", "U95"], readings),
+        "truth/truth.csv": csv_text(truths),
+        "readings.csv": csv_text(readings, ["entrant", *_KEY, "quantity", "value", "U95"]),
     }
     package = data_package(tables)
     for field in (field for part in package["resources"] for field in part["schema"]["fields"]):

@@ -31,12 +31,10 @@ def serve(address: str, listener: socket.socket) -> None:
             lines = os.read(0, 1 << 16).splitlines()
             if not lines:
                 return
-            for line in map(json.loads, lines):
-                # A session that was closed stays on the page, however short it was.
-                news.update(line, session=line["session"] or news.get("session"))
+            news = json.loads(lines[-1])
             continue
         begun_s = time.process_time()
-        if text := page.look(dict(news)):
+        if text := page.look(news):
             server.show(text)
         rest_s = _RESTS * (time.process_time() - begun_s)
         due_s = time.monotonic() + min(max(_LOOK_S, rest_s), _LATEST_S)

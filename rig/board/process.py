@@ -62,10 +62,11 @@ class BoardProcess:
 
     async def follow(self, published: PublishedState) -> None:
         """Tell the page which session is open and what its drop does, as long as both are there."""
-        before = None
+        before = path = None
         while self._process.poll() is None:
-            session, drop = published.get("session"), published.get("drop")
-            news = {"session": session and session["path"], "drop": drop}
+            # A session that was closed stays on the page.
+            path = session["path"] if (session := published.get("session")) else path
+            news = {"session": path, "drop": published.get("drop")}
             if news != before:
                 # It may be behind: then it is told later.
                 with suppress(BlockingIOError, BrokenPipeError):

@@ -17,7 +17,7 @@ from pathlib import Path
 from rig import __version__
 from rig.errors import RigError
 from rig.files import read_input
-from rig.reasons import rig_error
+from rig.reasons import errors_become, rig_error
 from rig.text_rows import read_text
 
 ROOT = "record/"
@@ -74,8 +74,9 @@ def seal(files: Mapping[str, bytes], title: str, words: str, date: str) -> dict[
 
 
 def list_hashes(files: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Add the list of hashes to some files."""
-    sums = [f"{sha256(files[name])}  {name}\n" for name in sorted(files)]
+    """Add the list of hashes to some files: of all but that list itself, and what signs it."""
+    names = sorted(files.keys() - {SUMS, SIGNATURE})
+    sums = [f"{sha256(files[name])}  {name}\n" for name in names]
     return {**files, SUMS: "".join(sums).encode()}
 
 
@@ -126,9 +127,7 @@ def read_bundle(path: str | os.PathLike[str]) -> tuple[dict[str, bytes], list[st
         files = _members(place, data)
     if SUMS not in files:
         raise _foreign(place, f"it has no {ROOT}{SUMS}")
-    # No hash can cover the list itself, and what signs it.
-    covered = {name: files[name] for name in files if name not in {SUMS, SIGNATURE}}
-    lists = (files[SUMS], list_hashes(covered)[SUMS])
+    lists = (files[SUMS], list_hashes(files)[SUMS])
     rows, again = (text.decode("utf-8", "replace").splitlines() for text in lists)
     names = sorted({row.partition("  ")[2] for row in {*rows} ^ {*again}})
     faults = [f"{name} is not as {SUMS} has it" for name in names]
@@ -176,10 +175,8 @@ def _check_archive(files: Mapping[str, bytes], data: bytes) -> list[str]:
 
 
 def _read(path: Path) -> bytes:
-    try:
+    with errors_become("bundle_unreadable", OSError, path=path):
         data = read_input(path, _LARGEST + 1)
-    except OSError as error:
-        raise rig_error("bundle_unreadable", path=path, text=error) from error
     if len(data) > _LARGEST:
         raise _foreign(path, f"it has more than {_LARGEST} bytes")
     return data

@@ -8,7 +8,7 @@ import math
 import re
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from typing import Any
 
 from rig.bundle.archive import CRATE, SUMS, seal, to_json
@@ -47,18 +47,14 @@ def copy_session(session: Reader) -> bytes:
 
 
 def bundle_files(
-    session: Reader,
-    data: bytes,
-    results: SessionResults,
-    drawn: Mapping[str, bytes],
-    history: Sequence[str],
+    session: Reader, results: SessionResults, drawn: Mapping[str, bytes], history: Sequence[str]
 ) -> dict[str, bytes]:
     """Make all files of a bundle.
 
     Parameters
     ----------
-    session, data
-        The session file of the bundle, open, and its bytes.
+    session
+        The session file of the bundle, open.
     results
         Of it.
     drawn
@@ -72,7 +68,7 @@ def bundle_files(
         Contents by name, ``SHA256SUMS`` included.
     """
     protocol = protocol_of(session)
-    tables = csv_files(session, results.json(), results.clock)
+    tables = csv_files(session, results)
     readme = tables.pop("README.txt")
     # What drops have in common, and so covariances, only a joint fit knows.
     tables |= mean_tables(protocol, results.complete or results.analysis)
@@ -85,7 +81,7 @@ def bundle_files(
         "tables/datapackage.json": to_json(data_package(tables)),
         RESULTS: to_json(results.json()),
         ENVIRONMENT: to_json(environment()),
-        SESSION: data,
+        SESSION: session.path.read_bytes(),
     }
     for number, attached in enumerate(session.attached_files(), 1):
         name = re.sub(r"[^\w.-]+", "_", attached.name)
@@ -107,11 +103,9 @@ def compare(stored: Mapping[str, bytes], derived: Mapping[str, bytes]) -> Iterat
         In how many digits all results agree, then a line that begins with `WRONG` for each file or
         number that does not.
     """
-    try:
-        before = dict(_leaves("", json.loads(stored.get(RESULTS, b"{}"))))
-    except ValueError:
-        before = {}
-    after = dict(_leaves("", json.loads(derived[RESULTS])))
+    before, after = {}, dict(_leaves(json.loads(derived[RESULTS])))
+    with suppress(ValueError):
+        before = dict(_leaves(json.loads(stored.get(RESULTS, b"{}"))))
     equal = {place: _equal_digits(before.get(place), after.get(place)) for place in before | after}
     digits = min([n for n in equal.values() if n >= DIGITS], default=_ALL)
     agree = "all digits agree" if digits == _ALL else f"{digits} digits agree"
@@ -124,14 +118,14 @@ def compare(stored: Mapping[str, bytes], derived: Mapping[str, bytes]) -> Iterat
     for place, n in equal.items():
         if n < DIGITS:
             words = [f"{side.get(place, 'nothing')!s:.40}" for side in (before, after)]
-            yield f"{WRONG}{RESULTS}, {place}: {words[0]}; derived: {words[1]}"
+            yield f"{WRONG}{RESULTS}, {place[1:]}: {words[0]}; derived: {words[1]}"
 
 
-def _leaves(place: str, value: Any) -> Iterator[tuple[str, object]]:
+def _leaves(value: Any, place: str = "") -> Iterator[tuple[str, object]]:
     """Spread JSON over its numbers and words, by place."""
     if isinstance(value, dict | list):
         for key, member in value.items() if isinstance(value, dict) else enumerate(value):
-            yield from _leaves(f"{place}.{key}" if place else str(key), member)
+            yield from _leaves(member, f"{place}.{key}")
     else:
         yield place, float(value) if type(value) in {int, float} else value
 

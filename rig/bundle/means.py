@@ -39,4 +39,4 @@ def mean_tables(protocol: Protocol, analysis: Analysis) -> dict[str, str]:
         if first != second
     ]
     tables = {"means.csv": means, "covariances.csv": covariances}
-    return {name: csv_text(list(rows[0]), rows) for name, rows in tables.items() if rows}
+    return {name: csv_text(rows) for name, rows in tables.items() if rows}

@@ -4,16 +4,15 @@ import os
 import sys
 from collections.abc import Callable, Mapping
 from getpass import getpass
-from typing import TypeVar
+from typing import Any
 
 from minisign import Error, PublicKey, SecretKey, Signature
 
 from rig.bundle.archive import PUBLIC_KEY, SIGNATURE, SUMS, list_hashes
 from rig.bundle.contents import WRONG
 from rig.files import read_input
-from rig.reasons import rig_error
+from rig.reasons import errors_become, rig_error
 
-Key = TypeVar("Key")
 _COMMENT = "rig export --bundle"
 _LONGEST = 4096
 """Bytes of a key file; minisign writes fewer than 300."""
@@ -44,8 +43,7 @@ def sign(files: Mapping[str, bytes], secret: SecretKey) -> dict[str, bytes]:
 
     The same files and key give the same bytes.
     """
-    rest = {name: files[name] for name in files if name != SUMS}
-    signed = list_hashes({**rest, PUBLIC_KEY: _text(secret.get_public_key())})
+    signed = list_hashes({**files, PUBLIC_KEY: _text(secret.get_public_key())})
     signature = secret.sign(signed[SUMS], untrusted_comment=_COMMENT, trusted_comment=_COMMENT)
     return {**signed, SIGNATURE: _text(signature)}
 
@@ -73,12 +71,10 @@ def check_signature(files: Mapping[str, bytes], key: str | os.PathLike[str] | No
     return f"signature: right, by the key {public.to_base64().decode()} ({whose})"
 
 
-def _read_key(path: str | os.PathLike[str], read: Callable[[bytes], Key]) -> Key:
+def _read_key(path: str | os.PathLike[str], read: Callable[[bytes], Any]) -> Any:
     """Read a key file; minisign's complaints about it become ours."""
-    try:
+    with errors_become("key_unusable", OSError, Error, path=path):
         return read(read_input(path, _LONGEST))
-    except (OSError, Error) as error:
-        raise rig_error("key_unusable", path=path, text=error) from error
 
 
 def _text(part: object) -> bytes:

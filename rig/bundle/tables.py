@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Mapping
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rig.bundle.archive import sha256
@@ -13,17 +14,15 @@ from rig.session.reading import Reader
 from rig.session.schema import TABLES
 from rig.text_rows import read_rows, read_text
 from rig.text_table import csv_text
-from rig.timers.edge_rows import HEADER, edges_text
+from rig.timers.edge_rows import edges_text
 
 if TYPE_CHECKING:  # tables are written without numpy
-    from rig.clock.calibration import Calibration
+    from rig.results.whole import SessionResults
 
 _LISTS = ("budget", "causes", "gates")  # of objects, for which a cell has no room
 _EDGES = "edges.csv"
 _ROWS_OF = {"states.csv: ": "run_state", "pings.csv: ": "ping", "edges.csv: ": "edge"}
 """Whose raw records a file has, for the meaning of its columns."""
-
-
 _ROWS = dict(read_rows(__file__, "columns.txt"))
 """The unit by the end of a column's name, which begins with ``_``, and what columns mean."""
 
@@ -36,16 +35,14 @@ def _meanings() -> dict[str, str]:
         for column in TABLES[table].columns
     } | _ROWS
     for row in MEASURANDS.values():
-        meanings |= {
-            row.name: row.meaning,
-            row.key("sd"): f"{row.symbol}: standard deviation between runs",
-            row.key("se"): f"{row.symbol}: standard error of the mean",
-        }
+        meanings[row.name] = row.meaning
+        meanings[row.key("sd")] = f"{row.symbol}: standard deviation between runs"
+        meanings[row.key("se")] = f"{row.symbol}: standard error of the mean"
     return meanings
 
 
 def csv_files(
-    session: Reader, analysis: Mapping[str, Any], clock: Calibration, leave_out: Container[str] = ()
+    session: Reader, outcome: SessionResults, leave_out: Container[str] = ()
 ) -> dict[str, str]:
     """Make ``runs``, ``summary``, ``budget``, ``edges``, ``states`` and ``pings.csv``, a README.
 
@@ -56,10 +53,8 @@ def csv_files(
     ----------
     session
         Open, for the raw records.
-    analysis
-        What ``rig analyze --json`` prints.
-    clock
-        Of its times.
+    outcome
+        Results of the session.
     leave_out
         Names of files that are not wanted.
 
@@ -68,17 +63,16 @@ def csv_files(
     dict
         Texts by file name.
     """
-    tables = {f"{name}.csv": rows for name, rows in result_tables(analysis).items()}
+    tables = {f"{name}.csv": rows for name, rows in result_tables(outcome.json()).items()}
     tables["states.csv"] = [
         {**entry._asdict(), "reasons": sentences(entry.reasons)} for entry in session.states()
     ]
     tables["pings.csv"] = [ping._asdict() for ping in session.pings()]
-    columns = {name: _columns(rows) for name, rows in tables.items() if name not in leave_out}
-    files = {name: csv_text(heading, tables[name]) for name, heading in columns.items()}
+    files = {name: csv_text(rows) for name, rows in tables.items() if name not in leave_out}
     if _EDGES not in leave_out:
-        columns[_EDGES] = HEADER
-        files[_EDGES] = edges_text(session.latest_drops(), lambda drop: clock.scale(drop).hz)
-    return files | {"README.txt": _readme(session, columns)}
+        drops = session.latest_drops()
+        files[_EDGES] = edges_text(drops, lambda drop: outcome.clock.scale(drop).hz)
+    return files | {"README.txt": _readme(session, files)}
 
 
 def result_tables(analysis: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]]:
@@ -89,9 +83,10 @@ def result_tables(analysis: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]
     analysis
         What ``rig analyze --json`` prints. Without gates' passages there is no table of them.
     """
-    latest, superseded = analysis.get("runs", []), analysis.get("superseded", [])
+    latest, superseded = analysis["runs"], analysis.get("superseded", [])
+    drops = [*latest, *superseded]
     # Where nothing is struck, nothing is inclined either.
-    struck = any(run.get("impact_chain", "") is not None for run in (*latest, *superseded))
+    struck = any(drop["impact_chain"] is not None for drop in drops)
     no_columns = _LISTS if struck else (*_LISTS, "incline_deg", "impact_chain")
 
     def row(record: Mapping[str, Any]) -> dict[str, object]:
@@ -100,19 +95,19 @@ def result_tables(analysis: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]
     def names(run: Mapping[str, Any]) -> dict[str, object]:
         return {key: run[key] for key in ("session", "run", "attempt") if key in run}
 
-    runs = [row(run) for run in latest]
+    runs = [row(drop) for drop in drops]
     if superseded:
-        runs = [{**run, "superseded": 0} for run in runs]
-        runs += [{**row(run), "superseded": 1} for run in superseded]
-        runs.sort(key=lambda run: (run.get("run", 0), run.get("attempt", 0)))
+        for place, run in enumerate(runs):
+            run["superseded"] = int(place >= len(latest))
+        runs.sort(key=lambda run: (run["run"], run["attempt"]))
     gates = [{**names(run), **flatten(gate)} for run in latest for gate in run.get("gates", ())]
     return {
         "runs": runs,
-        "summary": [row(line) for line in analysis.get("summary", [])],
+        "summary": [row(line) for line in analysis["summary"]],
         "budget": [
             names(run) | {"quantity": line["quantity"], "source": line["name"], "u": line["u"]}
-            for run in (*latest, *superseded)
-            for line in run.get("budget", [])
+            for run in drops
+            for line in run["budget"]
         ],
         **({"gates": gates} if gates else {}),
     }
@@ -121,8 +116,8 @@ def result_tables(analysis: Mapping[str, Any]) -> dict[str, list[dict[str, Any]]
 def column_unit(column: str) -> str:
     """Return the unit of a table's column, by the end of its name; empty where there is none."""
     name = column.removesuffix("_U95").removesuffix("_u")
-    ends = (end for end in _ROWS if end.startswith("_") and name.endswith(end))
-    return _ROWS.get(next(ends, ""), "")
+    units = (unit for end, unit in _ROWS.items() if end[0] == "_" and name.endswith(end))
+    return next(units, "")
 
 
 def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
@@ -133,13 +128,10 @@ def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
     """
     columns: dict[str, object] = {}
     for key, value in record.items():
-        name = prefix + key
-        if isinstance(value, dict) and "value" in value:
-            columns[name] = value["value"]
-            columns |= {f"{name}_{part}": value[part] for part in ("u", "U95") if part in value}
-        elif isinstance(value, dict):
+        name = prefix.removesuffix("_") if key == "value" else prefix + key
+        if isinstance(value, dict):
             columns |= flatten(value, f"{name}_")
-        elif isinstance(value, (list, tuple)):
+        elif isinstance(value, list):
             if dict not in map(type, value):
                 columns[name] = "; ".join(map(str, value))
         else:
@@ -147,24 +139,19 @@ def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
     return columns
 
 
-def _columns(rows: Iterable[Mapping[str, object]]) -> Sequence[str]:
-    """All columns in order of appearance; a void run may lack some that later runs have."""
-    fullest = sorted(rows, key=len, reverse=True)
-    return list(dict.fromkeys(key for row in fullest for key in row))
-
-
-def _readme(session: Reader, described: Mapping[str, Sequence[str]]) -> str:
+def _readme(session: Reader, tables: Mapping[str, str]) -> str:
     lines = ["SIMULATED DATA: nothing fell.", ""] if session.simulated else []
     head = read_text(__file__, "readme.txt")
     lines += head.format(source=session.protocol_source, **session.meta).splitlines()
-    for name, columns in sorted(described.items()):
+    for name, text in sorted(tables.items()):
+        columns = next(csv.reader(text.splitlines()))
         lines += ["", name, *(f"  {column}{_describe(name, column)}" for column in columns)]
     return "\n".join(lines) + "\n"
 
 
 def _describe(table: str, column: str) -> str:
     unit, meaning = describe_column(table, column)
-    words = " ".join(filter(None, [unit and f"[{unit}]", meaning]))
+    words = f"[{unit}] {meaning}".removeprefix("[] ").rstrip()
     return words and f": {words}"
 
 
@@ -173,8 +160,7 @@ def describe_column(table: str, column: str) -> tuple[str, str]:
     if column.endswith(("_u", "_U95")):
         return "", ""
     meanings = _meanings()
-    meaning = meanings.get(f"{table}: {column}", meanings.get(column, ""))
-    return column_unit(column), meaning
+    return column_unit(column), meanings.get(f"{table}: {column}", meanings.get(column, ""))
 
 
 def data_package(tables: Mapping[str, str]) -> dict[str, Any]:
@@ -190,11 +176,10 @@ def data_package(tables: Mapping[str, str]) -> dict[str, Any]:
 
 
 def _resource(table: str, text: str) -> dict[str, Any]:
-    header, *rows = csv.reader(text.splitlines()) if text.strip() else [[]]
     fields = []
-    for number, name in enumerate(header):
+    for name, *cells in zip(*csv.reader(text.splitlines()), strict=True):
         unit, meaning = describe_column(table, name)
-        kind = _type_of([row[number] for row in rows if row[number]])
+        kind = _type_of([*filter(None, cells)])
         field = {"name": name, "type": kind, "unit": unit, "description": meaning}
         fields.append({key: value for key, value in field.items() if value})
     return {
@@ -210,10 +195,8 @@ def _resource(table: str, text: str) -> dict[str, Any]:
 
 
 def _type_of(cells: list[str]) -> str:
-    for kind, read in (("integer", int), ("number", float)):
-        try:
-            [read(cell) for cell in cells]
-        except ValueError:
-            continue
-        return kind if cells else "string"
+    for kind, read in {"integer": int, "number": float}.items() if cells else ():
+        with suppress(ValueError):
+            sum(map(read, cells))
+            return kind
     return "string"

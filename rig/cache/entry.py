@@ -8,7 +8,7 @@ from contextlib import suppress
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import TypeVar
 
 from rig import __version__
 from rig.cache.plain import from_text, to_text
@@ -17,63 +17,56 @@ from rig.cache.store import CacheFolder
 Kept = TypeVar("Kept")
 
 
-class CacheEntry(Generic[Kept]):
-    """One kept result.
+def find(kind: type[Kept], *content: object, fresh: bool = False) -> Kept | None:
+    """Return a kept result; `None` where there is none.
 
     Parameters
     ----------
     kind
         Its type: what else is found is no result.
     *content
-        All that enters into it, besides this program; each has a `repr` that no other content has.
+        All that entered into it, besides this program; each has a `repr` that no other content has.
         Where any is `None`, nothing is kept.
     fresh
-        Whether to forget what was kept.
+        Whether to look for none.
     """
+    key = _key(kind, content)
+    text = CacheFolder().get(key) if key and not fresh else None
+    with suppress(ValueError):
+        if isinstance(result := from_text(text or ""), kind):
+            return result
+    return None
 
-    def __init__(self, kind: type[Kept], *content: object, fresh: bool = False) -> None:
-        self._kind = kind
-        parts = repr((kind.__qualname__, *content)).encode()
-        program = "" if None in content else _program()
-        self._key = program and f"{program} {hashlib.sha256(parts).hexdigest()}"
-        self._fresh = fresh
-        self._file = CacheFolder()
 
-    def find(self) -> Kept | None:
-        """Return a kept result; `None` where there is none."""
-        text = self._file.get(self._key) if self._key and not self._fresh else None
-        with suppress(ValueError):
-            result = from_text(text or "")
-            return result if isinstance(result, self._kind) else None
-        return None
+def keep(result: Kept, *content: object) -> Kept:
+    """Keep a result, and return it as `find` will.
 
-    def keep(self, result: Kept) -> Kept:
-        """Keep a result, and return it as `find` will.
-
-        Parameters
-        ----------
-        result
-            As `rig.cache.plain.to_text` takes it. One whose attribute `failed` names what it lacks
-            is not kept.
-        """
-        found: Kept = from_text(self.write(result))
-        return found
-
-    def write(self, result: Kept) -> str:
-        """Keep a result as `keep` does, and return its text."""
-        text = to_text(result)
-        if self._key and not getattr(result, "failed", ()):
-            self._file.put(self._key, text)
-        return text
+    Parameters
+    ----------
+    result
+        As `rig.cache.plain.to_text` takes it. One whose attribute `failed` names what it lacks
+        is not kept.
+    *content
+        As for `find`.
+    """
+    key, text = _key(type(result), content), to_text(result)
+    if key and not getattr(result, "failed", ()):
+        CacheFolder().put(key, text)
+    found: Kept = from_text(text)
+    return found
 
 
 def recall(
     kind: type[Kept], make: Callable[[], Kept], *content: object, fresh: bool = False
 ) -> Kept:
-    """Return a kept result, or else make it; arguments as for `CacheEntry`."""
-    entry = CacheEntry(kind, *content, fresh=fresh)
-    answer = entry.find()
-    return entry.keep(make()) if answer is None else answer
+    """Return a kept result, or else make it; arguments as for `find`."""
+    result = find(kind, *content, fresh=fresh)
+    return keep(make(), *content) if result is None else result
+
+
+def _key(kind: type, content: tuple[object, ...]) -> str:
+    program = "" if None in content else _program()
+    return program and repr((program, kind.__qualname__, *content))
 
 
 def environment() -> dict[str, str]:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rig.commands.output import Arguments
 from rig.files import read_input
-from rig.reasons import plain_reason, rig_error
+from rig.reasons import errors_become, plain_reason, rig_error
 from rig.report.numbers import ranges
 from rig.session.store import Session
 from rig.wordings import NOTE
@@ -29,10 +29,8 @@ def add_note(arguments: Arguments) -> None:
 def attach(arguments: Arguments) -> None:
     """Add a file to a session, for its report."""
     path = arguments.file
-    try:
+    with errors_become("attachment_unreadable", OSError, path=path):
         data = read_input(path, LARGEST + 1)
-    except OSError as error:
-        raise rig_error("attachment_unreadable", path=path, text=error) from error
     if not 0 < len(data) <= LARGEST:
         raise rig_error("attachment_size", path=path)
     with Session.open(arguments.session) as session:

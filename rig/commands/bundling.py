@@ -69,7 +69,7 @@ def derive_bundle(data: bytes) -> DerivedBundle:
                 for number, figure in enumerate(report.figures, 1)
             }
             history = describe_history(session, examined, outcome.analysis)
-            files = contents.bundle_files(session, data, outcome, drawn, history)
+            files = contents.bundle_files(session, outcome, drawn, history)
     return DerivedBundle(files, outcome.analysis, examined)
 
 

@@ -16,8 +16,7 @@ def main(arguments: Arguments) -> int:
     with Session.open(arguments.session, readonly=True) as session:
         folder = make_folder(arguments.csv)
         outcome = results(session, progress, fresh=arguments.fresh)
-        tables = csv_files(session, outcome.json(), outcome.clock)
-        for name, text in tables.items():
+        for name, text in csv_files(session, outcome).items():
             write_atomic(folder / name, text)
     say(f"CSV files: {arguments.csv}")
     return tell_damage(outcome.analysis)

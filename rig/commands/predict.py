@@ -46,7 +46,7 @@ def _write_figure(number: int, path: Path) -> None:
 
     picture = path.with_suffix(".svg") if path.suffix == ".csv" else path
     drawing, columns = paper.paper_figure(number)
-    rows = (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
+    rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
     canvas.write_figure(picture, drawing)
-    write_atomic(path.with_suffix(".csv"), csv_text(columns, rows))
+    write_atomic(path.with_suffix(".csv"), csv_text(rows))
     say(f"{picture} and {path.with_suffix('.csv')}")

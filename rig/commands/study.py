@@ -41,10 +41,9 @@ def carry_out(
 
 def _write(folder: Path, name: str, findings: Findings) -> None:
     """Write the table and pictures, and where there is a head also a page and all figures."""
-    columns = dict.fromkeys(column for row in findings.rows for column in row)
     texts = {f"{further}.svg": drawing for further, drawing in findings.pictures.items()}
     texts[f"{name}.svg"] = findings.picture
-    texts[f"{name}.csv"] = csv_text(columns, findings.rows) if columns else ""
+    texts[f"{name}.csv"] = csv_text(findings.rows) if findings.rows else ""
     if findings.head:
         texts[f"{name}.md"] = "\n".join([findings.head, "", "```text", *findings.lines, "```", ""])
         texts[f"{name}.json"] = json.dumps(findings.record, indent=2, ensure_ascii=False) + "\n"

@@ -7,7 +7,7 @@ import socket
 import struct
 from pathlib import Path
 
-from rig.reasons import rig_error
+from rig.reasons import errors_become, rig_error
 
 _SECRET = 0o077  # what the group and others may not have
 _CREDENTIALS = struct.Struct("3i")  # pid, uid, gid
@@ -28,11 +28,9 @@ def prepare_folder(folder: Path) -> None:
     InputError
         Somebody else's, or open to others: whoever can write there could pose as the daemon.
     """
-    try:
+    with errors_become("place_unusable", OSError, path=folder):
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         check_folder(folder)
-    except OSError as error:
-        raise rig_error("place_unusable", path=folder, text=error) from error
 
 
 def require_sockets() -> None:

@@ -10,7 +10,7 @@ from subprocess import DEVNULL, PIPE, STDOUT, Popen, TimeoutExpired
 from rig.flash.boards import Target
 from rig.flash.image import Image
 from rig.link.port import open_port
-from rig.reasons import rig_error
+from rig.reasons import errors_become, rig_error
 
 _LOOK_S = 0.2
 _CAUSES = {
@@ -58,12 +58,10 @@ def write_flash(
     # -D: a boot loader erases each page as it comes, and knows no erasing of the whole chip.
     writing = ["-D", "-P", port, "-U", f"flash:w:{image.path}:i"]
     command = [avrdude, *target.avrdude.split(), *writing]
-    try:
+    with errors_become("program_failed", OSError, path=avrdude):
         child = Popen(
             command, text=True, errors="replace", stdin=DEVNULL, stdout=PIPE, stderr=STDOUT
         )
-    except OSError as error:
-        raise rig_error("program_failed", path=avrdude, text=error) from error
     output = None
     while output is None:
         with suppress(TimeoutExpired):

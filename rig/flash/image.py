@@ -15,7 +15,7 @@ from typing import NamedTuple
 from rig.errors import InputError, Problem
 from rig.files import read_input
 from rig.flash.boards import TARGETS, Target
-from rig.reasons import rig_error
+from rig.reasons import errors_become, rig_error
 
 _DATA, _END = 0, 1
 _BASES = {2: 4, 4: 16}
@@ -61,10 +61,8 @@ def read_image(file: str | Path | None, target: Target) -> Image:
         The file is damaged, is no firmware of this project, or is for another board.
     """
     path = target.image_path if file is None else Path(file)
-    try:
+    with errors_become("image_unreadable", OSError, path=path):
         data = read_input(path)
-    except OSError as error:
-        raise rig_error("image_unreadable", path=path, text=error) from None
     flash = bytearray()
     for at, content in (_read_records if target.avrdude else _read_blocks)(data, path):
         if at + len(content) > target.flash_limit:

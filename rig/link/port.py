@@ -15,7 +15,7 @@ from serial.urlhandler import protocol_socket
 from rig.clock.host import Clock, SystemClock
 from rig.errors import RigError
 from rig.ports import check_name
-from rig.reasons import rig_error
+from rig.reasons import errors_become, rig_error
 
 BAUDRATE = 500_000
 """Exact from 16 MHz (UBRR 3 with U2X); 115200 would be 2.1 % off."""
@@ -104,10 +104,8 @@ def check_url(url: str) -> None:
     """
     check_name(url)
     _add_handlers()
-    try:
+    with errors_become("not_a_port", ValueError, port=url):
         serial.serial_for_url(url, do_not_open=True)
-    except ValueError as error:
-        raise rig_error("not_a_port", port=url, text=error) from error
 
 
 def _add_handlers() -> None:

@@ -23,7 +23,7 @@ from operator import mul
 
 from rig.errors import DomainError
 from rig.model.chain import Chain
-from rig.model.fall import Fall, Leg, checked_fall, free_leg
+from rig.model.fall import Fall, checked_fall
 
 
 def leg_drags(chain: Chain, drags: Sequence[float]) -> list[float]:
@@ -74,13 +74,6 @@ def cylinder_drag(
     return 0.5 * coefficient * density * diameter * length * cos(radians(tilt_deg)) ** 3
 
 
-def air_legs(kappas: Sequence[float]) -> Leg:
-    """Return the `leg` function of `rig.model.fall.hits`; κ before each impact, 1/m, or empty."""
-    if not kappas:
-        return free_leg
-    return lambda distance, speed, gravity, rod: drag_leg(distance, speed, gravity, kappas[rod])
-
-
 def drag_fall(
     chain: Chain,
     gains: Sequence[float],
@@ -89,7 +82,7 @@ def drag_fall(
     gravity: float,
     initial_speed: float = 0.0,
 ) -> Fall:
-    """Return Δz, V and t of a fall in air; arguments as in `rig.model.fall.hits` and `air_legs`.
+    """Return Δz, V and t of a fall in air; arguments as in `rig.model.fall`.
 
     Δz keeps full relative precision as α → 0 and as drags become equal: it is summed from the
     impacts' own effects and, where κ changes from leg to leg, from those of κ' − κ.

@@ -232,6 +232,15 @@ def free_leg(distance: float, speed: float, gravity: float, _rod: int = 0) -> tu
     return arrival, 2.0 * distance / (speed + arrival)
 
 
+def air_legs(kappas: Sequence[float]) -> Leg:
+    """Return the `leg` function of `hits`; κ before each impact, 1/m, or empty without air."""
+    if not kappas:
+        return free_leg
+    from rig.model.drag import drag_leg  # noqa: PLC0415 - only where there is air
+
+    return lambda distance, speed, gravity, rod: drag_leg(distance, speed, gravity, kappas[rod])
+
+
 def never_falls() -> DomainError:
     """Return the error for a scene in which the chain would never move."""
     return DomainError(

@@ -8,7 +8,7 @@ from typing import Any
 from rig.errors import DomainError
 from rig.measurands import FALL_TIME, SEPARATION, SPEED
 from rig.model.chain import Chain
-from rig.model.fall import Fall, fall, free_leg, kicks
+from rig.model.fall import Fall, air_legs, fall, kicks
 from rig.model.impact import MU, impact_on, stated_coefficients, with_coefficients
 from rig.model.prediction import PredictedIncline
 from rig.model.surface import Surface
@@ -50,17 +50,12 @@ def predict(
     on the side where its possible range ends.
     """
     start, pull, height = initial_speed.value, gravity.value, max(0.0, drop.value + chain.length)
-    if kappas:
-        from rig.model.drag import drag_fall, drag_leg  # noqa: PLC0415 - only where there is air
-
-        free = drag_leg(height, start, pull, kappas[0])
-    else:
-        free = free_leg(height, start, pull)
+    free_speed, _ = air_legs(kappas)(height, start, pull, 0)
     air = ", drag" if kappas else ""
     result = PredictedIncline(
         incline_deg=incline_deg,
         model=f"discrete{air}",
-        free_fall_speed_m_s=free[0],
+        free_fall_speed_m_s=free_speed,
         in_domain=False,
         notes=[],
     )
@@ -76,6 +71,8 @@ def predict(
         alpha, drag, *place = (centre | moved).values()
         if not kappas:
             return fall(chain, alpha, impact.gamma, *place)
+        from rig.model.drag import drag_fall  # noqa: PLC0415 - only where there is air
+
         gains = kicks(chain, [alpha] * chain.rods, impact.gamma)
         return drag_fall(chain, gains, [drag * kappa for kappa in kappas], *place)
 

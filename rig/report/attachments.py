@@ -33,7 +33,7 @@ def attachments(
 ) -> list[Attachment]:
     """Return a session's tables as attachments, without those too large for a page."""
     few = sum(len(drop.edges) for drop in drops) + len(session.pings()) <= _ROWS
-    tables = csv_files(session, outcome.json(), outcome.clock, () if few else _LARGE)
+    tables = csv_files(session, outcome, () if few else _LARGE)
     tables |= {"protocol.yaml": session.protocol_text}
     contents = {name: text.encode("utf-8", "replace") for name, text in tables.items()}
     words = (

@@ -229,4 +229,4 @@ def csv_table(figure: Chart) -> str:
         for series in panel.series
         for point in zip_longest(series.x, series.y, series.u, series.base)
     ]
-    return csv_text(_COLUMNS, [dict(zip(_COLUMNS, row, strict=True)) for row in rows])
+    return csv_text([dict(zip(_COLUMNS, row, strict=True)) for row in rows], _COLUMNS)

@@ -47,7 +47,7 @@ def result_figure(
     """
     good = [run for run in analysis.runs if run.verdict in GOOD]
     measured = {name for run in good for name in run.quantities}
-    rows = [row for row in averaged() if row.name in measured]
+    rows = [*averaged(measured)]
     if not rows:
         return None
     title = " and ".join(f"{row.title} {row.symbol}" for row in rows)

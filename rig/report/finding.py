@@ -63,10 +63,9 @@ def headline(summary: Sequence[Incline]) -> list[Number]:
             place = _place(line) if len(means) > 1 else ""
             numbers.append(Number(quantity, value, row.unit, place))
     differences = summary[0].differences if len(summary) == 1 else {}
-    for row in averaged():
-        if row.name in differences:
-            value = plus_minus(differences[row.name], row.fine_scale, row.fine_decimals)
-            numbers.append(Number(f"{row.symbol} − {_reference(row)}", value, row.fine))
+    for row in averaged(differences):
+        value = plus_minus(differences[row.name], row.fine_scale, row.fine_decimals)
+        numbers.append(Number(f"{row.symbol} − {_reference(row)}", value, row.fine))
     return numbers[:MOST_NUMBERS]
 
 

@@ -9,7 +9,7 @@ from itertools import chain
 import numpy as np
 
 from rig.analysis.drop import DropSummary
-from rig.cache.entry import CacheEntry
+from rig.cache.entry import find, keep
 from rig.protocol.protocol import Protocol
 from rig.records import Drop
 
@@ -28,20 +28,20 @@ class KnownDrops:
     """
 
     def __init__(self, protocol: Protocol, *, blind: bool = False, fresh: bool = False) -> None:
-        self._content = None if blind else (protocol.text, protocol.gates.mask)
+        self._scene = None if blind else (protocol.text, protocol.gates.mask)
         self._fresh = fresh
 
     def get(self, drop: Drop) -> DropSummary | None:
         """Return the summary of a drop; `None` if there is none."""
-        stored = self._entry(drop).find()
+        stored = find(DropSummary, *self._content(drop), fresh=self._fresh)
         return stored and stored.whole()
 
     def __setitem__(self, drop: Drop, summary: DropSummary) -> None:
-        self._entry(drop).write(summary)
+        keep(summary, *self._content(drop))
 
-    def _entry(self, drop: Drop) -> CacheEntry[DropSummary]:
+    def _content(self, drop: Drop) -> tuple[object, str]:
         digest = sha256(f"{edges_digest(drop)} {replace(drop, edges=())}".encode()).hexdigest()
-        return CacheEntry(DropSummary, self._content, digest, fresh=self._fresh)
+        return self._scene, digest
 
 
 def edges_digest(drop: Drop) -> str:

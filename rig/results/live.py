@@ -18,7 +18,7 @@ from rig.analysis.drop import DropSummary
 from rig.analysis.joint_fit import FEWEST
 from rig.analysis.result import GOOD, DropResult
 from rig.analysis.session import Analysis, drop_case, gather, overrule, plan_of, sum_up
-from rig.cache.entry import CacheEntry
+from rig.cache.entry import find
 from rig.clock.calibration import Calibration, Calibrator, TimeScale
 from rig.protocol.protocol import Protocol, Run
 from rig.records import Drop, Job
@@ -183,7 +183,7 @@ class LiveAnalysis:
             members = self._members(results)
             # Look for a stored analysis of these records; that of a blind session has no values.
             if digest and enough and not scene.blind and self._joint_fit[0] != members:
-                finished = CacheEntry(SessionResults, digest).find()
+                finished = find(SessionResults, digest)
                 if finished is not None:
                     self._joint_fit = members, finished.analysis
             self._readings += 1

@@ -12,7 +12,7 @@ from typing import Any
 from rig.analysis.gravity import GravityCheck, check_gravity
 from rig.analysis.session import Analysis, Progress, analyze
 from rig.analysis.summary import Incline
-from rig.cache.entry import CacheEntry
+from rig.cache.entry import find, keep
 from rig.clock.calibration import Calibration, Calibrator, TimeScale
 from rig.plain_data import attributes, plain
 from rig.protocol import reader
@@ -149,12 +149,11 @@ def results(
         Whether to ignore the cache.
     """
     with session.snapshot():
-        entry = CacheEntry(SessionResults, session.digest(), fresh=fresh)
-        stored = entry.find()
+        stored = find(SessionResults, session.digest(), fresh=fresh)
         if stored is not None:  # the course of a clock's rate is not stored
             return replace(stored, clock=calibration(session))
         new = _analyze(session, progress, fresh=fresh)
-        return replace(entry.keep(new), clock=new.clock, complete=new.complete)
+        return replace(keep(new, new.digest), clock=new.clock, complete=new.complete)
 
 
 def _analyze(session: Reader, progress: Progress | None, *, fresh: bool) -> SessionResults:

@@ -11,7 +11,7 @@ from tempfile import TemporaryDirectory
 
 from rig.errors import InputError
 from rig.files import beside, replacing, require_file
-from rig.reasons import rig_error
+from rig.reasons import errors_become, rig_error
 from rig.session.faults import translate_errors
 from rig.session.foreign import check_schema
 from rig.session.hashes import extend_chain
@@ -64,11 +64,9 @@ def check_place(path: Path) -> None:
     SessionError
         The file is missing, empty, or not a regular file.
     """
-    try:
+    with errors_become("session_absent", OSError, path=path):
         require_file(path)
         size = path.stat().st_size
-    except OSError as error:
-        raise rig_error("session_absent", path=path, text=error) from error
     if size == 0:  # SQLite would take it for an empty database
         raise rig_error("not_a_session", path=path, text="it is empty")
 

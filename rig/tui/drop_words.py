@@ -37,8 +37,7 @@ def expected_words(protocol: Protocol, run: Run) -> str:
     expected = predicted_run(protocol, run)
     values = [
         f"{row.symbol} {plus_minus(expected[row.name], row.scale)} {row.unit}"
-        for row in averaged()
-        if row.name in expected
+        for row in averaged(expected)
     ]
     return "  ".join(values)
 
@@ -46,7 +45,7 @@ def expected_words(protocol: Protocol, run: Run) -> str:
 def sentence(view: SessionView, job: Job) -> str:
     """Return the drop's main result with the model's value in words; empty without a result."""
     result, run = view.results[job], view.plan[job.run]
-    row = next((row for row in averaged() if row.name in result.quantities), None)
+    row = next(averaged(result.quantities), None)
     if row is None:
         return ""
     measured = result.quantities[row.name]
@@ -64,7 +63,7 @@ def past_runs(view: SessionView, job: Job) -> str:
     parts, unit = [], ""
     for drop in view.jobs[: view.jobs.index(job) + 1][-_PAST:]:
         result = view.results[drop]
-        row = next((row for row in averaged() if row.name in result.quantities), None)
+        row = next(averaged(result.quantities), None)
         value = "" if row is None else f" {result.quantities[row.name].value * row.scale:.4g}"
         unit = unit if row is None else f" ({row.unit})"
         parts.append(f"{drop.run} {LOOKS[result.verdict][0]}{value}")

@@ -15,8 +15,8 @@ from rig.errors import DomainError
 from rig.model import batch
 from rig.model.batch import falls, given_impacts, surface_impacts
 from rig.model.chain import Chain
-from rig.model.drag import air_legs, drag_fall, drag_leg, fallen, falling_speed, leg_drags
-from rig.model.fall import fall, hits, kicks
+from rig.model.drag import drag_fall, drag_leg, fallen, falling_speed, leg_drags
+from rig.model.fall import air_legs, fall, hits, kicks
 from rig.model.impact import impact_on
 from rig.model.surface import Pile, Surface
 from rig.units import Quantity
