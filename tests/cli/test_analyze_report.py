@@ -1,6 +1,5 @@
 """``rig analyze``, its budget, and ``rig report`` of a session on the disk."""
 
-import json
 import re
 from unittest.mock import Mock
 
@@ -59,7 +58,7 @@ def test_a_report_can_be_written_of_a_session_without_a_drop(call, tmp_path, pro
     text = protocol.read_text("utf-8")
     Session.create(session, text, protocol.name, simulated=False, origin="/dev/ttyACM0").close()
     done = call("analyze", session, "--json")
-    assert (json.loads(done.out)["runs"], json.loads(done.out)["summary"]) == ([], [])
+    assert (done.json["runs"], done.json["summary"]) == ([], [])
     call("report", session, "-o", tmp_path / "r.html")
     html = (tmp_path / "r.html").read_text("utf-8")
     assert "No accepted runs" in html
@@ -99,7 +98,7 @@ def test_scatter_is_told_beside_uncertainty(call, finished, analysis):
 
 def test_a_budget_adds_up_and_agrees_with_its_trials(call, finished):
     done = call("analyze", finished.session, "--budget", 1, "--trials", 40, "--json")
-    found = json.loads(done.out)
+    found = done.json
     assert (found["simulated"], found["run"], found["monte_carlo"]["trials"]) == (True, 1, 40)
     for name, one in found["budget"].items():
         assert sum(line["share"] for line in one["lines"]) == pytest.approx(1.0)

@@ -1,6 +1,5 @@
 """Damage costs what is damaged: any value of any row altered, through every command that reads."""
 
-import json
 import random
 import sqlite3
 from contextlib import closing
@@ -67,7 +66,7 @@ def read(call, path, folder, what):
         codes[command] = done.code
         assert "bug" not in done.err, (what, done.err)
         if command == "analyze" and done.code != 2:
-            found = json.loads(done.out)
+            found = done.json
     try:
         with door.open(path) as session:
             session.analyze()
@@ -122,7 +121,7 @@ def test_a_damaged_drop_is_called_damaged_and_the_others_are_analysed(
     path.write_bytes(sound.read_bytes())
     alter(path, *["DELETE FROM bytes"] * bytes_too, sql)
     check(call, without, path, tmp_path, "edge", sql)
-    found = json.loads(call("analyze", "--json", path, code=3).out)
+    found = call("analyze", "--json", path, code=3).json
     assert [run["run"] for run in found["runs"] if run.get("damaged")] == [2]
     assert "1 of 3 drops (run 2, attempt 1)" in call("analyze", path, code=3).out
     done = call("export", path, "--csv", tmp_path / "tables", code=3)

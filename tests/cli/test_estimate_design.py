@@ -1,6 +1,5 @@
 """``rig estimate``, ``rig design`` and the import of data loggers' tables, as users meet them."""
 
-import json
 import re
 
 import pytest
@@ -15,7 +14,7 @@ FENCE = PROTOCOLS / "picket-fence.yaml"
 
 
 def test_an_estimate_says_everything_in_json(call, finished):
-    found = json.loads(call("estimate", finished.session, "--json").out)
+    found = call("estimate", finished.session, "--json").json
     assert found["simulated"] is True
     assert found["drops"] == 4
     names = {one["name"] for one in found["parameters"]}
@@ -23,12 +22,12 @@ def test_an_estimate_says_everything_in_json(call, finished):
     for one in found["parameters"]:
         assert set(one["least_squares"]) == {"value", "u", "U95"}
     assert {"alpha", "comparison", "curves", "end_correction", "impulses", "tests"} <= set(found)
-    assert json.loads(call("estimate", finished.session, "--json").out) == found
+    assert call("estimate", finished.session, "--json").json == found
 
 
 def test_a_design_of_what_is_there(call):
     words = ("design", PROTOCOLS / "single-chain.yaml", "--no-search", "--json")
-    found = json.loads(call(*words).out)
+    found = call(*words).json
     assert found["scatter"] == "stated"
     assert "proposed" not in found
     assert found["current"]["readable"]
@@ -36,7 +35,7 @@ def test_a_design_of_what_is_there(call):
     # About that of a drop measured by itself.
     u = case(SINGLE, Dials.quiet()).analyze().quantities["speed_m_s"].u
     assert speed["u_run"] == pytest.approx(u, rel=0.1)
-    twice = json.loads(call(*words, "--repeats", "48").out)
+    twice = call(*words, "--repeats", "48").json
     (again,) = [one for one in twice["current"]["measurands"] if one["name"] == "speed_m_s"]
     assert again["inclines"][0]["u_mean"] < speed["inclines"][0]["u_mean"]
 
@@ -67,9 +66,9 @@ def test_a_design_proposes_heights_and_writes_them(call, tmp_path):
 
 def test_a_design_by_the_scatter_that_a_session_taught(call, finished):
     done = call("design", finished.protocol, "--no-search", "--json", "--learned", finished.session)
-    found = json.loads(done.out)
+    found = done.json
     assert found["scatter"] == "learned"
-    stated = json.loads(call("design", finished.protocol, "--no-search", "--json").out)
+    stated = call("design", finished.protocol, "--no-search", "--json").json
     for one, other in zip(
         found["current"]["measurands"], stated["current"]["measurands"], strict=True
     ):

@@ -1,7 +1,5 @@
 """Edges go out as CSV and come in from any timer."""
 
-import json
-
 import pytest
 
 from tests.cli.lab import drops_of, short
@@ -49,7 +47,7 @@ def test_exported_edges_give_the_same_results_again(bring, call, analysis, tmp_p
     assert done.out == ""
     edges = sum(run["edges"]["received"] for run in analysis["runs"])
     assert done.err == f"{edges} edges of 4 runs → {tmp_path / 'imported'}\n"
-    again = json.loads(call("analyze", tmp_path / "imported", "--json").out)
+    again = call("analyze", tmp_path / "imported", "--json").json
     for one, two in zip(analysis["runs"], again["runs"], strict=True):
         assert (one["run"], one["verdict"]) == (two["run"], two["verdict"])
         assert one["edges"] == two["edges"]
@@ -74,7 +72,7 @@ def test_only_what_is_simulated_is_stamped(bring, first, call, tmp_path):
         bring(*more, session=name, events=first)
         session, page = tmp_path / name, tmp_path / f"{name}.html"
         stamped = name == "simulated"
-        assert json.loads(call("analyze", session, "--json").out)["simulated"] is stamped
+        assert call("analyze", session, "--json").json["simulated"] is stamped
         assert call("analyze", session).out.startswith("SIMULATED DATA\n") is stamped
         call("report", session, "-o", page)
         assert ("SIMULATED DATA" in page.read_text("utf-8")) is stamped
@@ -97,11 +95,11 @@ def test_an_import_is_replayed_without_bytes(bring, call, tmp_path):
 def test_what_an_import_lacks_can_be_measured_afterwards(bring, first, call, finished, tmp_path):
     bring("--simulated", "--clock-uncertainty", "10 ppm", events=first)
     session = tmp_path / "imported"
-    before = json.loads(call("analyze", session, "--json").out)["runs"]
+    before = call("analyze", session, "--json").json["runs"]
     done = call("run", finished.protocol, "--port", "sim://", "--session", session, "--json")
     assert drops_of(session) == [(1, 1), (2, 1), (3, 1), (4, 1)]
     # What the new drops teach about the rig changes the numbers of the old ones, but not this.
-    for old, new in zip(before, json.loads(done.out)["runs"], strict=False):
+    for old, new in zip(before, done.json["runs"], strict=False):
         assert new["calibration"] == old["calibration"], "its own clock stays its own"
 
 

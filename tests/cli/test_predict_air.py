@@ -1,6 +1,5 @@
 """Predictions with an initial speed and in air, against the model and against many digits."""
 
-import json
 import math
 from itertools import accumulate
 
@@ -32,7 +31,7 @@ def predict(call, tmp_path):
         path.write_text(text, "utf-8")
         done = call("predict", path, "--json")
         assert done.err == ""
-        line, *others = json.loads(done.out)["predictions"]
+        line, *others = done.json["predictions"]
         assert [one["impact_chain"] for one in others] == (["B"] if "impact_chain" in line else [])
         return line
 

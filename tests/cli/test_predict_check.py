@@ -1,7 +1,5 @@
 """``rig predict`` and ``rig check``: what follows from a protocol alone, before anything hangs."""
 
-import json
-
 import pytest
 
 from rig.design.trials import Trials
@@ -20,7 +18,7 @@ UNIFORM = PROTOCOLS / "inclined-uniform.yaml"
 @pytest.fixture
 def predicted(call):
     """Give what is predicted of a protocol."""
-    return lambda path: json.loads(call("predict", path, "--json").out)["predictions"]
+    return lambda path: call("predict", path, "--json").json["predictions"]
 
 
 def test_json_has_every_field_of_every_incline(predicted):

@@ -1,6 +1,5 @@
 """``rig run`` from beginning to end, and how it fails."""
 
-import json
 import os
 import re
 from html import unescape
@@ -70,7 +69,7 @@ def test_what_is_measured_is_what_happened(finished, analysis):
 
 def test_three_voids_of_a_kind_end_it_with_code_3_and_still_json(run, call, tmp_path):
     done = run("s", "--json", port="sim://?skew_sd=1s", code=3)
-    found = json.loads(done.out)
+    found = done.json
     assert [(r["run"], r["attempt"], r["verdict"]) for r in found["runs"]] == [(1, 3, "void")]
     assert all(r["reasons"] for r in found["runs"])
     assert [(r["run"], r["attempt"]) for r in found["superseded"]] == [(1, 1), (1, 2)]

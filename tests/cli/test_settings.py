@@ -1,7 +1,5 @@
 """Sessions whose plan varies a key of the scene: one rig, one fit, a line for each setting."""
 
-import json
-
 import pytest
 
 from rig.analysis.owners import suffixes
@@ -38,7 +36,7 @@ def chains(tmp_path_factory):
 
 
 def analysed(call, *sessions):
-    return json.loads(call("analyze", *map(str, sessions), "--json").out)
+    return call("analyze", *map(str, sessions), "--json").json
 
 
 def test_gravity_is_one_mean_of_all_heights_and_gates_are_of_each(balls, call):
@@ -83,7 +81,7 @@ def test_pages_tables_and_coefficients_tell_the_settings_apart(chains, call, tmp
     page = tmp_path / "page.html"
     call("report", str(chains), "-o", str(page))
     assert page.read_text("utf-8").count(CHAINS[1]) > 4
-    found = json.loads(call("estimate", str(chains), "--json").out)
+    found = call("estimate", str(chains), "--json").json
     assert [line["setting"] for line in found["alpha"]["inclines"]] == CHAINS
     assert {run["setting"] for run in found["alpha"]["runs"]} == {*CHAINS}
     call("replay", str(chains))

@@ -1,6 +1,5 @@
 """The export: what the scene has, in files other programs read."""
 
-import json
 import shutil
 from dataclasses import replace
 
@@ -40,7 +39,7 @@ def test_all_files(fences, call, tmp_path):
 def test_a_table_has_the_values_of_json(fences, call, tmp_path):
     """Which columns a scene has is for `tests.cli.test_bundle`."""
     call("export", fences, "--csv", tmp_path)
-    found = json.loads(call("analyze", fences, "--json").out)
+    found = call("analyze", fences, "--json").json
     for table in ("runs", "summary"):
         for line, record in zip(read_csv(tmp_path / f"{table}.csv"), found[table], strict=True):
             cells = [float(line[f"gravity_m_s2{part}"]) for part in ("", "_u", "_U95")]

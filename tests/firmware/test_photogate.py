@@ -8,6 +8,7 @@ from rig.errors import InputError
 from rig.model import photogate
 from tests.firmware.toolchain import FIRMWARE, need
 from tests.programs import run_program
+from tests.refusals import refused
 
 NAMED = {"distance_m": 0.06, "slit_m": 0.5e-3, "led": "TSAL6100", "detector": "BPW85C"}
 DECK = Path(__file__).with_name("photogate.cir").read_text("ascii")
@@ -52,8 +53,8 @@ def test_a_gate_of_every_pair_is_lit_at_half_of_what_its_led_bears():
 
 
 def test_too_little_light_is_said():
-    with pytest.raises(InputError, match="too little light"):
-        photogate.design_photogate(**{**NAMED, "detector": "BPW85", "led": "TSAL6400"})
+    dark = {**NAMED, "detector": "BPW85", "led": "TSAL6400"}
+    refused(InputError, "too little light", photogate.design_photogate, **dark)
 
 
 @pytest.mark.parametrize("board", ["rp2040", "atmega2560", "atmega328p"])

@@ -13,6 +13,7 @@ from rig.errors import DomainError
 from rig.model.continuum import UniformChain, end, end_speed, separation_leading_order
 from tests.examples import examples
 from tests.model.chains import ALPHAS, close, decades
+from tests.refusals import refused
 from tests.tables import cases
 
 # A sum of some hundred positive terms, each of a dozen roundings; 4e-15 is the worst seen.
@@ -58,8 +59,7 @@ def test_the_speed_at_the_end_is_equation_14(length, reach, alpha, drop, gravity
 
 @cases
 def test_says_what_is_wrong_with_a_chain(change, message):
-    with pytest.raises(DomainError, match=message):
-        replace(PAPER, **change)
+    refused(DomainError, message, replace, PAPER, **change)
 
 
 def printed_15(alpha, length, reach):
