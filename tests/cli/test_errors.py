@@ -69,19 +69,6 @@ def test_every_problem_of_a_protocol_has_its_line_and_column(told, tmp_path):
     assert not (tmp_path / "s").exists()
 
 
-def test_simulated_and_real_data_are_never_mixed(told, protocol, tmp_path):
-    """That a simulated session is not continued at a real port is a story."""
-    real = tmp_path / "real"
-    text = Path(protocol).read_text("utf-8")
-    Session.create(real, text, "p.yaml", simulated=False, origin="/dev/ttyACM0").close()
-    before = real.read_bytes()
-    for port in ("sim://", "emu://?board=mega"):
-        said = told("run", protocol, "--port", port, "--session", real)
-        assert f"is a real session and {port}" in said
-    assert real.read_bytes() == before
-    assert not (tmp_path / "real.truth.jsonl").exists()
-
-
 @cases
 def test_a_name_that_means_nothing_starts_nothing(told, protocol, tmp_path, port, found, instead):
     session = tmp_path / "new.session"

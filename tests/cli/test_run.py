@@ -125,19 +125,6 @@ def test_a_bad_line_may_be_exchanged_for_a_better_one(run, tmp_path, fence):
     ]
 
 
-def test_a_session_that_was_moved_can_be_continued(call, tmp_path, fence):
-    def run(folder):
-        return call("run", folder / "short.yaml", "--port", "sim://", "--session", folder / "s")
-
-    old, new = tmp_path / "old", tmp_path / "new"
-    old.mkdir()
-    (old / "short.yaml").write_bytes(fence.read_bytes())
-    run(old)
-    old.rename(new)
-    run(new)
-    assert not old.exists()
-
-
 def test_blocked_beams_that_nobody_clears_are_device_trouble(run, tmp_path):
     assert "hint: " in run(port="sim://?drop_error=12&seed=2", code=4).err
     assert log_of(tmp_path / "s") == {}, "nothing was armed"

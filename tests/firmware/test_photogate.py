@@ -1,12 +1,15 @@
-"""The photogate as drawn: `rig gate` against ngspice, and its resistors against the pages."""
+"""The photogate as drawn: `rig gate` against ngspice, and its resistors, which can be bought."""
 
 from pathlib import Path
 
 import pytest
+from hypothesis import given
 
 from rig.errors import InputError
 from rig.model import photogate
+from rig.model.photogate import next_standard
 from tests.firmware.toolchain import FIRMWARE, need
+from tests.model.chains import decades
 from tests.programs import run_program
 from tests.refusals import refused
 
@@ -64,3 +67,13 @@ def test_the_drawing_has_the_resistors_that_were_computed(board):
     assert f"{gate['load resistor, Ω'] / 1e3:g} kΩ" in drawing
     assert f"{gate['LED resistor, Ω']:g} Ω" in drawing
     assert "74HC14" not in drawing
+
+
+SERIES = [1.0, 1.2, 1.5, 1.8, 2.2, 2.7, 3.3, 3.9, 4.7, 5.6, 6.8, 8.2]  # E12 of IEC 60063
+
+
+@given(decades(0, 6))
+def test_a_resistor_is_the_next_one_of_its_series(ohm):
+    all_there_are = [first * 10.0**power for power in range(8) for first in SERIES]
+    wanted = min(one for one in all_there_are if one > 0.999 * ohm)
+    assert next_standard(ohm) == pytest.approx(wanted, rel=1e-9)

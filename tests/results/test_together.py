@@ -15,7 +15,6 @@ from tests.analysis.kept_results import FOLDER
 from tests.cli.lab import PROTOCOLS, record
 from tests.refusals import refused
 from tests.session.altering import alter
-from tests.tables import cases
 
 
 def record_few(folder, name, scene="picket-fence", seed=1, series=0, change=("", ""), repeats=4):
@@ -144,9 +143,3 @@ def test_a_damaged_session_is_refused(two, tmp_path):
     copy = shutil.copy(two[0], tmp_path / "copy.session")
     alter(copy, 'UPDATE "drop" SET crc32 = crc32 + 1 WHERE id = 2')
     refused_by("records_damaged", InputError, two[1], copy)
-
-
-@cases
-def test_options_for_another_number_of_sessions_are_refused(two, call, sessions, options):
-    done = call("analyze", *two[:sessions], *options, code=2)
-    assert options[0].replace("--no-", "--") in done.err
