@@ -3,14 +3,10 @@
 import pytest
 
 from rig.design.trials import Trials
-from rig.predictions import predictions
 from rig.protocol.describe import describe
 from rig.protocol.reader import read
 from tests.cli.lab import PROTOCOLS, short
-from tests.tables import cases, read_table
-
-FIELDS = {*read_table(__file__, "fields")["predictions"]}
-
+from tests.tables import cases
 
 UNIFORM = PROTOCOLS / "inclined-uniform.yaml"
 
@@ -19,14 +15,6 @@ UNIFORM = PROTOCOLS / "inclined-uniform.yaml"
 def predicted(call):
     """Give what is predicted of a protocol."""
     return lambda path: call("predict", path, "--json").json["predictions"]
-
-
-def test_json_has_every_field_of_every_incline(predicted):
-    """That the numbers are right is for tests/model and tests/test_predictions.py."""
-    lines = predicted(UNIFORM)
-    assert lines == [one.json() for one in predictions(read(UNIFORM))]
-    assert [line["incline_deg"] for line in lines] == list(range(0, 90, 10))
-    assert all(line.keys() >= FIELDS for line in lines)
 
 
 def test_the_table_says_the_same(call, predicted):
@@ -40,12 +28,6 @@ def test_the_table_says_the_same(call, predicted):
         assert (incline, alpha) == (line["incline_deg"], pytest.approx(line["alpha"], abs=5e-5))
         assert separation == pytest.approx(100.0 * line["separation_m"], abs=0.05)
         assert expanded == pytest.approx(196.0 * line["separation_u_m"], rel=0.06)
-
-
-def test_a_given_alpha_needs_no_surface_numbers(predicted):
-    (line,) = predicted(PROTOCOLS / "bead-chain.yaml")
-    assert (line["alpha"], line["gamma"]) == (0.12, 0.0)
-    assert line["separation_u_m"] > 0.0
 
 
 @pytest.fixture

@@ -76,14 +76,11 @@ def test_each_setting_is_compared_with_its_own_prediction(chains, call):
     assert sum(abs(found["value"] - truth) < found["U95"] for found, truth in values) >= 7
 
 
-def test_pages_tables_and_coefficients_tell_the_settings_apart(chains, call, tmp_path):
+def test_pages_and_tables_tell_the_settings_apart(chains, call, tmp_path):
     assert CHAINS[1] in call("predict", str(chains.with_name("s.yaml"))).out
     page = tmp_path / "page.html"
     call("report", str(chains), "-o", str(page))
     assert page.read_text("utf-8").count(CHAINS[1]) > 4
-    found = call("estimate", str(chains), "--json").json
-    assert [line["setting"] for line in found["alpha"]["inclines"]] == CHAINS
-    assert {run["setting"] for run in found["alpha"]["runs"]} == {*CHAINS}
     call("replay", str(chains))
 
 

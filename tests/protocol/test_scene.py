@@ -23,7 +23,7 @@ from rig.protocol.reader import parse, read
 from rig.protocol.site import gravity_at
 from rig.protocol.yamltree import load, place_of
 from rig.units import Quantity
-from tests.analysis.drops import FENCE, UNIFORM, case
+from tests.analysis.drops import UNIFORM, case
 from tests.protocol.test_protocol_reader import GOOD
 from tests.refusals import refused
 from tests.tables import cases, protocol_text
@@ -101,12 +101,6 @@ def test_rig_check_lists_them_all_and_marks_those_of_the_protocol():
         (line,) = [one for one in lines if one.split()[:1] == [name]]
         assert line.endswith(key.meaning)
         assert ("(stated)" in line) == (name == "hang")
-
-
-def test_rig_check_lists_none_that_nothing_depends_on():
-    """A fence falls freely, and its cards are level."""
-    listed = {line.split()[0] for line in describe(FENCE).splitlines() if line.startswith("  ")}
-    assert listed & {*PRIORS} == {"edge_floor", "jitter", "hang", "drag"}
 
 
 def test_an_adjustment_takes_what_the_protocol_states():
