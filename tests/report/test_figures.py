@@ -4,10 +4,9 @@ import csv
 import io
 import math
 import signal
-import xml.etree.ElementTree as ET
 from dataclasses import replace
 from itertools import combinations
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 import pytest
 
@@ -61,7 +60,7 @@ def figures() -> list[Chart]:
 def test_a_figure_is_drawn_whole(figure, kind):
     width = {"slim": COLUMN_PT, "wide": WIDE_PT}[kind]
     svg = page_svg(replace(figure, simulated=True), width, kind)
-    root = ElementTree.fromstring(svg)
+    root = ET.fromstring(svg)
     assert root.get("class") == kind
     assert float(root.get("viewBox").split()[2]) == width
     shown = {(node.text or "").strip() for node in root.iter() if node.tag.endswith("text")}
