@@ -39,7 +39,7 @@ def test_check_says_what_is_there_and_what_was_left_out(call, protocol):
 def test_a_board_that_lacks_something_is_refused_before_anything_is_hung(
     call, tmp_path, old, new, problem
 ):
-    """What a board lacks that is named, rig check says: tests/protocol."""
+    """That `rig check` says so of boards by name is for tests/protocol."""
     path, session = tmp_path / "p.yaml", tmp_path / "p.session"
     path.write_text(short(repeats=1).replace(old, new), "utf-8")
     done = call("run", path, "--port", "sim://", "--session", session, code=2)

@@ -94,29 +94,6 @@ def test_a_line_that_loses_most_bytes_is_device_trouble_and_can_be_continued(
     run(protocol=fence)
 
 
-def ports_of(session):
-    with Session.open(session, readonly=True) as opened:
-        return [identity["port"] for _, identity in opened.identities()]
-
-
-def test_a_bad_line_may_be_exchanged_for_a_better_one(run, tmp_path, fence):
-    for seed in range(1, 40):
-        session = tmp_path / f"s{seed}"
-        worn = {"port": "sim://?lose=3%25", "protocol": fence}
-        done = run(session.name, "--seed", seed, **worn, code={0, 4})
-        if done.code == 4 and ports_of(session):
-            break
-    else:
-        pytest.fail("no seed gets through to the board and fails then")
-    run(session.name, port="sim://?lose=0", protocol=fence)
-    assert "run " not in run(session.name, protocol=fence).err, "nothing is made again"
-    assert_whole(session, 2)
-    assert ports_of(session) == [
-        f"sim://?lose=3%25&seed={seed}",
-        *[f"sim://?lose=0&seed={seed}"] * 2,
-    ]
-
-
 def test_blocked_beams_that_nobody_clears_are_device_trouble(run, tmp_path):
     assert "hint: " in run(port="sim://?drop_error=12&seed=2", code=4).err
     assert log_of(tmp_path / "s") == {}, "nothing was armed"
