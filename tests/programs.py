@@ -1,8 +1,9 @@
 """Other programs, run to their end."""
 
+import json
 import subprocess
 from collections.abc import Container
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from tests.waiting import PATIENCE_S
 
@@ -13,6 +14,11 @@ class Done(NamedTuple):
     code: int
     out: str
     err: str
+
+    @property
+    def json(self) -> Any:
+        """What it printed, read again."""
+        return json.loads(self.out)
 
 
 def end(code: int, out: str, err: str, codes: int | Container[int] = 0) -> Done:

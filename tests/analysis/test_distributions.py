@@ -7,8 +7,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from mpmath import mp, mpf
 
+from rig.analysis.budget_lines import effective_degrees
 from rig.analysis.distributions import COVERAGE_95, chi2_tail, coverage_factor
 from tests.examples import examples
+from tests.refusals import refused
 
 
 def covered(k, degrees) -> mpf:
@@ -37,8 +39,7 @@ def test_infinitely_many_degrees_are_the_normal_distribution():
 @pytest.mark.parametrize("degrees", [0.999, 0.0, -3.0, -math.inf, math.nan])
 def test_fewer_than_one_degree_is_refused(degrees):
     for function in (coverage_factor, lambda nu: chi2_tail(1.0, nu)):
-        with pytest.raises(ValueError, match="degrees of freedom; at least 1"):
-            function(degrees)
+        refused(ValueError, "degrees of freedom; at least 1", function, degrees)
 
 
 @pytest.mark.parametrize("degrees", [1, 2, 3, 9, 24, 207, 1001])
@@ -53,3 +54,15 @@ def test_the_tail_of_chi2(degrees):
 
 def test_a_fit_that_is_better_by_rounding_is_no_misfit():
     assert chi2_tail(-1e-12, 1) == 1.0
+
+
+def test_an_end_gauge_has_the_degrees_of_freedom_of_the_gum():
+    """GUM (JCGM 100), H.1.6: components in nm, ν_eff = 16.7, taken as 16; U for 99 % is 93 nm."""
+    budget = {"standard": 25.0, "comparison": 9.7, "expansion": 2.9, "temperature": 16.6}
+    u = math.hypot(*budget.values())
+    assert u == pytest.approx(32.0, abs=0.5)
+    degrees = effective_degrees(
+        u, budget, {"standard": 18.0, "comparison": 25.6, "expansion": 50.0, "temperature": 2.0}
+    )
+    assert degrees == pytest.approx(16.7, abs=0.1)
+    assert coverage_factor(math.floor(degrees), 0.99) * 32.0 == pytest.approx(93.0, abs=0.5)

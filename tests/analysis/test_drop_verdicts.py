@@ -21,6 +21,7 @@ from rig.records import Edge
 from sim.dials import Dials
 from tests.analysis.drops import FENCE, HZ, SINGLE, UNIFORM, Case, case, codes, with_dials
 from tests.examples import examples
+from tests.refusals import refused
 
 MILD = Dials(skew_sd=1e-3)
 QUIET = case(UNIFORM, Dials.quiet(), incline=40.0)
@@ -110,13 +111,11 @@ def scale(drop):
 
 def test_a_run_that_is_not_planned_or_a_scene_without_gates_is_bad_input():
     drop = replace(attempts((1, 1))[0], run=13)
-    with pytest.raises(InputError, match="run 13 is not in the plan, which has 12"):
-        analyze(SINGLE, [drop], scale)
-    damaged = replace(drop, damage="its bytes say otherwise")
-    with pytest.raises(InputError, match="damaged: run 13: its bytes say otherwise; see rig recov"):
-        analyze(SINGLE, [damaged], scale)
-    with pytest.raises(InputError, match="no gates"):
-        analyze(replace(SINGLE, gates=Gates()), [], scale)
+    refused(InputError, "run 13 is not in the plan, which has 12", analyze, SINGLE, [drop], scale)
+    damaged = [replace(drop, damage="its bytes say otherwise")]
+    said = "damaged: run 13: its bytes say otherwise; see rig recov"
+    refused(InputError, said, analyze, SINGLE, damaged, scale)
+    refused(InputError, "no gates", analyze, replace(SINGLE, gates=Gates()), [], scale)
 
 
 def test_a_session_of_void_drops_has_no_summary():

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from rig.analysis.adjust import least_squares
-from tests.analysis.least_squares import plain_equations
+from rig.analysis.equations import Linearization
+from rig.analysis.square_root import EquationRows
 
 DIGITS = 1e-4
 VAGUE = 1e10  # times a starting value: a prior that pulls by less than a digit
@@ -52,9 +53,11 @@ def fit(model, begin, sd, y, x, done):
         aside = 1e-30 * np.eye(b.size) * np.maximum(np.abs(b), 1e-30)
         slopes = [modelled(b + 1j * row).imag / row.sum() for row in aside]
         slopes = [np.broadcast_to(one, y.shape) for one in slopes]
-        return plain_equations(
-            left / (sigma * inflation), np.stack(slopes, axis=1).astype(float) / (sigma * inflation)
+        slopes, left = (
+            part / (sigma * inflation) for part in (np.stack(slopes, axis=1).astype(float), left)
         )
+        rows = {"": EquationRows(slopes, left, np.arange(b.size))}
+        return Linearization(rows, chi2 := float(left @ left), left.size, chi2)
 
     found = least_squares(equations, sd, begin, begin, done=done, steps=STEPS)
     scatter = math.sqrt(found.chi2 / (y.size - sd.size))

@@ -117,6 +117,7 @@ def here(monkeypatch):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("loops_compiled")
 def test_the_command_leaves_page_and_table(tmp_path, monkeypatch, capsys, here):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))

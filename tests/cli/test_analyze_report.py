@@ -1,6 +1,5 @@
 """``rig analyze``, its budget, and ``rig report`` of a session on the disk."""
 
-import json
 import re
 from unittest.mock import Mock
 
@@ -21,18 +20,9 @@ def page(finished, tmp_path_factory):
     return path
 
 
-def test_the_report_is_one_page_that_loads_nothing(page):
-    assert [path.name for path in page.parent.iterdir()] == ["report.html"]
-    html = page.read_text("utf-8")
-    loaded = re.findall(r'(?:src|href|srcset|data|action|poster)\s*=\s*["\']([^"\']*)', html)
-    assert all(target.startswith(("#", "data:")) for target in loaded), loaded
-    assert not re.search(r"@import|url\((?!\s*[\"']?#)|<script |<link|<iframe|<object", html)
-    assert "default-src 'none'" in html
-    assert not re.findall(r"https?://(?!www\.w3\.org/)[^\s<]*", html)
-
-
 @cases
 def test_the_report_has_the_stamp_all_figures_and_every_run(texts, page, finished):
+    assert [path.name for path in page.parent.iterdir()] == ["report.html"]
     html = page.read_text("utf-8")
     assert html.startswith("<!DOCTYPE html>")
     assert [text for text in texts if text not in html] == []
@@ -43,10 +33,7 @@ def test_the_report_has_the_stamp_all_figures_and_every_run(texts, page, finishe
     assert len(html) < 400_000
     with Session.open(finished.session, readonly=True) as session:
         assert session.meta["protocol_sha256"] in html
-
-
-def test_a_report_tells_no_paths_of_the_machine(page, finished):
-    assert str(finished.session.parent) not in page.read_text("utf-8")
+    assert str(finished.session.parent) not in html, "no paths of the machine"
 
 
 def test_the_same_session_gives_the_same_page(call, finished, page, tmp_path):
@@ -59,7 +46,7 @@ def test_a_report_can_be_written_of_a_session_without_a_drop(call, tmp_path, pro
     text = protocol.read_text("utf-8")
     Session.create(session, text, protocol.name, simulated=False, origin="/dev/ttyACM0").close()
     done = call("analyze", session, "--json")
-    assert (json.loads(done.out)["runs"], json.loads(done.out)["summary"]) == ([], [])
+    assert (done.json["runs"], done.json["summary"]) == ([], [])
     call("report", session, "-o", tmp_path / "r.html")
     html = (tmp_path / "r.html").read_text("utf-8")
     assert "No accepted runs" in html
@@ -82,31 +69,7 @@ def test_what_cannot_be_written_is_not_begun(
     assert [one.name for one in tmp_path.iterdir()] == ["file"]
 
 
-def test_scatter_is_told_beside_uncertainty(call, finished, analysis):
-    done = call("analyze", finished.session, "--scatter")
-    part = done.out[done.out.index("Scatter of the runs") :]
-    assert all(word in part for word in ("SD", "SE", "U95", "SD/2"))
-    rows = [row.split() for row in part.splitlines() if "Δz (mm)" in row]
-    assert len(rows) == len(analysis["summary"])
-    for row, line in zip(rows, analysis["summary"], strict=True):
-        mean, sd, se, u, expanded, half = map(float, row[-6:])
-        assert mean == pytest.approx(1e3 * line["separation_m"]["value"], abs=1e-3)
-        assert sd == pytest.approx(1e3 * line["separation_sd_m"], abs=1e-3)
-        assert (se, half) == pytest.approx((sd / line["n"] ** 0.5, sd / 2), abs=1e-3)
-        assert u == pytest.approx(1e3 * line["separation_m"]["u"], abs=1e-3)
-        assert expanded == pytest.approx(1e3 * line["separation_m"]["U95"], abs=1e-3)
-
-
-def test_a_budget_adds_up_and_agrees_with_its_trials(call, finished):
-    done = call("analyze", finished.session, "--budget", 1, "--trials", 40, "--json")
-    found = json.loads(done.out)
-    assert (found["simulated"], found["run"], found["monte_carlo"]["trials"]) == (True, 1, 40)
-    for name, one in found["budget"].items():
-        assert sum(line["share"] for line in one["lines"]) == pytest.approx(1.0)
-        assert one["U95"] == pytest.approx(one["k"] * one["u"])
-        trial = found["monte_carlo"]["quantities"][name]
-        # χ² of 39, once in 10⁴ each side.
-        assert 0.6 < trial["u"] / found["by_itself"][name]["u"] < 1.45
+def test_a_budget_is_written_in_symbols_and_fits_a_terminal(call, finished):
     table = call("analyze", finished.session, "--budget", 1, "--trials", 2).out
     assert re.match("SIMULATED DATA\n(?s:.*)beam heights", table)
     assert re.search(r"^Δz = [0-9.]+ ± [0-9.]+ cm", table, re.MULTILINE)

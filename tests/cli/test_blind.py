@@ -2,7 +2,6 @@
 
 import base64
 import io
-import json
 import re
 import zipfile
 
@@ -60,7 +59,7 @@ def test_what_was_measured_is_kept_back_until_the_session_is_unblinded(call, tmp
     assert "skew" in ran.err
     for said in (ran.out, ran.err, call("analyze", session).out):
         assert_silent("commands", said)
-    found = json.loads(call("analyze", session, "--json").out)
+    found = call("analyze", session, "--json").json
     assert found["blind"] is True
     assert found["summary"] == []
     for run in found["runs"]:
@@ -85,7 +84,7 @@ def test_what_was_measured_is_kept_back_until_the_session_is_unblinded(call, tmp
     call("unblind", session)
     assert " wins by " in board.look(news)
     assert "is open since" in call("unblind", session, code=2).err
-    after = json.loads(call("analyze", session, "--json").out)
+    after = call("analyze", session, "--json").json
     assert "blind" not in after
     assert all("separation_m" in run for run in after["runs"])
     call("replay", session)

@@ -268,10 +268,10 @@ def test_notes_and_files_change_no_verdict_and_travel(fences, call, tmp_path):
     session, photo = tmp_path / "my.session", tmp_path / "rig µ.jpg"
     shutil.copy(fences, session)
     photo.write_bytes(b"\xff\xd8 a photograph")
-    before = [run["verdict"] for run in json.loads(call("analyze", session, "--json").out)["runs"]]
+    before = [run["verdict"] for run in call("analyze", session, "--json").json["runs"]]
     call("notes", session, "--run", 3, "the magnet let go late")
     call("attach", session, photo)
-    after = [run["verdict"] for run in json.loads(call("analyze", session, "--json").out)["runs"]]
+    after = [run["verdict"] for run in call("analyze", session, "--json").json["runs"]]
     assert after == before
     call("export", session, "--bundle", tmp_path / "b.eln")
     assert read_bundle(tmp_path / "b.eln")[0]["attached/1-rig_µ.jpg"] == photo.read_bytes()

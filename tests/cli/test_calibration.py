@@ -1,7 +1,6 @@
 """Which clock a result stands on: said by every run, the same whenever it is computed."""
 
 import hashlib
-import json
 import re
 from dataclasses import replace
 from itertools import pairwise
@@ -26,7 +25,7 @@ def measure(call, tmp_path, fence):
     def measure(dials="", name="s", protocol=fence):
         session = tmp_path / name
         done = call("run", protocol, "--port", f"sim://{dials}", "--session", session, "--json")
-        return session, json.loads(done.out)
+        return session, done.json
 
     return measure
 
@@ -43,7 +42,7 @@ def test_every_result_says_its_calibration_and_says_it_again(measure, call):
         assert run["calibration"]["source"] == "pings"
         assert abs(run["calibration"]["rate_ppm"] + 1300.0) < 4.0 * run["calibration"]["u_ppm"]
     for _ in range(2):
-        assert json.loads(call("analyze", session, "--json").out) == found
+        assert call("analyze", session, "--json").json == found
     assert call("replay", session).out.splitlines()[-1] == "identical"
     line = call("analyze", session).out.splitlines()[-1]
     assert re.match(r"Board clock: 1\d{3} ppm slow, corrected \(± \S+ ppm\)\.$", line)
@@ -83,7 +82,7 @@ def test_gravity_that_is_not_the_places_is_said(measure, call, fence):
     assert "its protocol was altered" in call("analyze", wrong, code=2).err
     digest = hashlib.sha256(text.encode()).hexdigest()
     tamper(wrong, "UPDATE meta SET value = ? WHERE key = 'protocol_sha256'", digest)
-    found = json.loads(call("analyze", wrong, "--json").out)
+    found = call("analyze", wrong, "--json").json
     assert not found["calibration"]["gravity"]["agrees"]
     assert found["calibration"]["gravity"]["normalized_error"] < -1.0
     assert "free fall gives g = 9.8" in call("analyze", wrong).out.splitlines()[-1]

@@ -11,92 +11,25 @@ import pytest
 
 from rig.commands import output
 from rig.session.store import Session
-from tests.cli.lab import PROTOCOLS, ROOT, Terminal, command, rig, short
+from tests.cli.lab import PROTOCOLS, ROOT, Terminal, command, rig
 from tests.programs import run_program
 from tests.tables import cases
 
 
-@pytest.fixture
-def told(call):
-    """Call ``rig``, and see that the user is told on stderr, and in words, why it ends."""
-
-    def words(*arguments, code=2):
-        done = call(*arguments, code=code)
-        assert done.out == ""
-        assert done.err
-        assert "Error" not in done.err
-        return done.err
-
-    return words
-
-
 @cases
 def test_a_port_that_cannot_be_opened_is_device_trouble(
-    told, protocol, tmp_path, port, said, monkeypatch
+    call, protocol, tmp_path, port, said, monkeypatch
 ):
     monkeypatch.setattr("rig.recorder.recorder.BOOT_WAIT_S", 0.0)
     monkeypatch.setattr("rig.link.client.LOADER_WAIT_S", 0.0)
     monkeypatch.setattr("rig.link.exchange._LONGEST_WAIT_S", 0.0)
-    assert said in told("run", protocol, "--port", port, "--session", tmp_path / "s", code=4)
+    assert said in call("run", protocol, "--port", port, "--session", tmp_path / "s", code=4).err
     if port != "loop://":  # it was never opened
         assert not (tmp_path / "s").exists()
         return
     with Session.open(tmp_path / "s") as session:
         assert not session.simulated
         assert session.states() == []
-
-
-def test_every_problem_of_a_protocol_has_its_line_and_column(told, tmp_path):
-    protocol = tmp_path / "bad.yaml"
-    text = short().replace("drop: 180 mm", "drop: 180 kg").replace("repeats: 2", "repeat: 2")
-    protocol.write_text(text + "gravity: 9.8 m/s^2\n", "utf-8")
-    for arguments in (
-        ("check",),
-        ("predict",),
-        ("run", "--port", "sim://", "--session", tmp_path / "s"),
-    ):
-        problems = told(*arguments, protocol).splitlines()
-        place = rf"{re.escape(str(protocol))}:(\d+):(\d+): (\S+): .+"
-        places = [re.fullmatch(place, line) for line in problems]
-        assert all(places), problems
-        lines = text.splitlines()
-        found = {(int(place[1]), place[3]) for place in places}
-        assert {
-            (1 + lines.index("drop: 180 kg ± 2 mm"), "drop"),
-            (len(lines) + 1, "gravity"),
-        } <= found
-        assert any(key == "plan.repeat" for _, key in found)
-    assert not (tmp_path / "s").exists()
-
-
-def test_simulated_and_real_data_are_never_mixed(told, protocol, tmp_path):
-    """That a simulated session is not continued at a real port is a story."""
-    real = tmp_path / "real"
-    text = Path(protocol).read_text("utf-8")
-    Session.create(real, text, "p.yaml", simulated=False, origin="/dev/ttyACM0").close()
-    before = real.read_bytes()
-    for port in ("sim://", "emu://?board=mega"):
-        said = told("run", protocol, "--port", port, "--session", real)
-        assert f"is a real session and {port}" in said
-    assert real.read_bytes() == before
-    assert not (tmp_path / "real.truth.jsonl").exists()
-
-
-@cases
-def test_a_name_that_means_nothing_starts_nothing(told, protocol, tmp_path, port, found, instead):
-    session = tmp_path / "new.session"
-    socket = tmp_path / "place" / "rig.sock"
-    for arguments in (
-        ("run", protocol, "--port", port, "--session", session, "--yes"),
-        ("tui", protocol, "--port", port, "--session", session),
-        ("daemon", "--port", port, "--socket", socket),
-        ("selftest", "--port", port),
-        ("doctor", "--port", port),
-    ):
-        said = told(*arguments)
-        assert f"{port}: {found}" in said
-        assert instead in said
-    assert list(tmp_path.iterdir()) == [protocol]
 
 
 # ------------------------------------------------- where the output goes

@@ -1,7 +1,11 @@
-"""What the command line says of itself, and of what it does not accept."""
+"""What the command line says of itself, to people and to shells, and of what it does not accept."""
 
+import os
 import re
 import shlex
+import shutil
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -12,6 +16,7 @@ from rig.commands.output import VOID
 from rig.commands.replay import DIFFERENT
 from rig.errors import DeviceError, InputError, RigError
 from rig.flash.boards import TARGETS
+from tests.programs import run_program
 from tests.refusals import refused
 from tests.tables import cases
 
@@ -83,8 +88,43 @@ def test_a_mistake_is_named_and_nothing_is_written(
 ):
     finished.copy(tmp_path)
     (tmp_path / "there.yaml").write_text("just words\n", "utf-8")
+    (tmp_path / "edges.csv").write_text("run,channel,time_s,state\n1,0,0.1,1\n", "utf-8")
     monkeypatch.chdir(tmp_path)
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     done = call(*words, code=4 if said.startswith("cannot open") else 2)
     assert (done.out, said in done.err) == ("", True), done
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def completed(tmp_path, line):
+    """Ask as the shells' functions do."""
+    answer = tmp_path / "answer"
+    asked = {
+        "_ARGCOMPLETE": "1", "_ARGCOMPLETE_IFS": "\n", "COMP_LINE": line,
+        "COMP_POINT": str(len(line)), "_ARGCOMPLETE_STDOUT_FILENAME": str(answer),
+    }  # fmt: skip
+    run_program(sys.executable, "-m", "rig", env=os.environ | asked)
+    return {word.strip() for word in answer.read_text("utf-8").splitlines()}
+
+
+def test_commands_options_choices_and_files_are_completed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.yaml").touch()
+    every = {name for name in COMMANDS if " " not in name}
+    assert every <= completed(tmp_path, "rig ")
+    assert completed(tmp_path, "rig analyze my.session --bud") == {"--budget"}
+    assert completed(tmp_path, "rig report my.session --bars half") == {"half-SD"}
+    assert completed(tmp_path, "rig check min") == {"mine.yaml"}
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
+def test_bash_reads_what_is_printed(tmp_path):
+    script = """
+    eval "$(rig completion bash)"
+    COMP_WORDS=(rig ana) COMP_CWORD=1 COMP_LINE="rig ana" COMP_POINT=7
+    _python_argcomplete rig ana rig
+    echo "${COMPREPLY[@]}"
+    """
+    path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+    done = run_program("bash", "-c", script, env=os.environ | {"PATH": path}, cwd=tmp_path)
+    assert done.stdout.split() == ["analyze"]

@@ -1,11 +1,15 @@
-"""Edges go out as CSV and come in from any timer."""
+"""Edges go out as CSV, with all else that the scene has, and come in from any timer."""
 
-import json
+import shutil
+from dataclasses import replace
 
 import pytest
 
-from tests.cli.lab import drops_of, short
-from tests.tables import cases
+from rig.reasons import plain_reason
+from rig.session.schema import RunState
+from rig.session.store import Session
+from tests.cli.lab import drops_of
+from tests.tables import read_csv
 
 QUANTITIES = ("separation_m", "separation_raw_m", "speed_m_s", "release_skew_s")
 
@@ -49,7 +53,7 @@ def test_exported_edges_give_the_same_results_again(bring, call, analysis, tmp_p
     assert done.out == ""
     edges = sum(run["edges"]["received"] for run in analysis["runs"])
     assert done.err == f"{edges} edges of 4 runs → {tmp_path / 'imported'}\n"
-    again = json.loads(call("analyze", tmp_path / "imported", "--json").out)
+    again = call("analyze", tmp_path / "imported", "--json").json
     for one, two in zip(analysis["runs"], again["runs"], strict=True):
         assert (one["run"], one["verdict"]) == (two["run"], two["verdict"])
         assert one["edges"] == two["edges"]
@@ -68,90 +72,51 @@ def test_exported_edges_give_the_same_results_again(bring, call, analysis, tmp_p
     assert again["clock"] == {"source": "times as the file gives them", "relative_u": 1e-6}
 
 
-@pytest.mark.usefixtures("analysed_once", "undrawn")
-def test_only_what_is_simulated_is_stamped(bring, first, call, tmp_path):
-    for name, more in (("simulated", ("--simulated",)), ("real", ())):
-        bring(*more, session=name, events=first)
-        session, page = tmp_path / name, tmp_path / f"{name}.html"
-        stamped = name == "simulated"
-        assert json.loads(call("analyze", session, "--json").out)["simulated"] is stamped
-        assert call("analyze", session).out.startswith("SIMULATED DATA\n") is stamped
-        call("report", session, "-o", page)
-        assert ("SIMULATED DATA" in page.read_text("utf-8")) is stamped
-        call("export", session, "--csv", tmp_path / f"{name}-csv")
-        readme = (tmp_path / f"{name}-csv" / "README.txt").read_text("utf-8")
-        assert readme.startswith("SIMULATED DATA") is stamped
-
-
-def test_an_import_is_replayed_without_bytes(bring, call, tmp_path):
-    bring()
-    session = tmp_path / "imported"
-    done = call("replay", session)
-    assert done.out.splitlines() == [
-        "no bytes were recorded: the edges come from a file",
-        "results: 4 identical",
-        "identical",
-    ]
-
-
 def test_what_an_import_lacks_can_be_measured_afterwards(bring, first, call, finished, tmp_path):
     bring("--simulated", "--clock-uncertainty", "10 ppm", events=first)
     session = tmp_path / "imported"
-    before = json.loads(call("analyze", session, "--json").out)["runs"]
+    before = call("analyze", session, "--json").json["runs"]
     done = call("run", finished.protocol, "--port", "sim://", "--session", session, "--json")
     assert drops_of(session) == [(1, 1), (2, 1), (3, 1), (4, 1)]
     # What the new drops teach about the rig changes the numbers of the old ones, but not this.
-    for old, new in zip(before, json.loads(done.out)["runs"], strict=False):
+    for old, new in zip(before, done.json["runs"], strict=False):
         assert new["calibration"] == old["calibration"], "its own clock stays its own"
 
 
-@pytest.fixture
-def refused(bring, tmp_path):
-    def lines(*more, **files):
-        done = bring(*more, code=2, **files)
-        assert done.out == ""
-        assert not (tmp_path / "imported").exists()
-        return done.err.splitlines()
-
-    return lines
-
-
-def test_runs_beyond_the_plan_are_refused(refused, exported, tmp_path):
-    events = tmp_path / "events.csv"
-    events.write_text(
-        (exported / "edges.csv").read_text("utf-8") + "5,0,0.1,1\n7,0,0.1,1\n", "utf-8"
-    )
-    first, hint = refused(events=events)
-    assert first.startswith(f"{events}: run 5 is not in the plan, which has ")
-    assert first.endswith("which has 4 runs")
-    assert hint.startswith("  hint: ")
-
-
-def test_what_is_missing_is_named(refused, tmp_path):
-    (line,) = refused(events=tmp_path / "none.csv")
-    assert line == f"{tmp_path / 'none.csv'}: cannot read this file: No such file or directory"
-
-
-@cases
-def test_what_is_absurd_or_stated_again_is_refused(refused, option, value, said):
-    """The project's own format says all of a file, but how good its clock was."""
-    first, *_ = refused(f"{option}={value}")
-    assert first.removeprefix("rig import: argument ").startswith(f"{option}: {said}")
+def test_all_files(fences, call, tmp_path):
+    """Edges are those of the Python door, see `tests.cli.test_door`."""
+    copy = shutil.copy(fences, tmp_path / "s")
+    with Session.open(copy) as session:
+        session.add_drop(replace(session.drop(2, 1), attempt=2, certificate=None))
+        void = [plain_reason("lost edges"), plain_reason('say "no", twice')]
+        session.add_state(2, 2, RunState.VOID, 10, void)
+        states, pings = session.states(), session.pings()
+    place = tmp_path / "deep" / "out"
+    for _ in range(2):  # the second time replaces
+        call("export", copy, "--csv", place)
+    runs = [(row["run"], row["attempt"], row["superseded"]) for row in read_csv(place / "runs.csv")]
+    assert runs[:3] == [("1", "1", "0"), ("2", "1", "1"), ("2", "2", "0")]
+    said = read_csv(place / "states.csv")
+    assert [row["state"] for row in said] == [entry.state for entry in states]
+    assert said[-1]["reasons"] == 'lost edges; say "no", twice'
+    ticks = [int(row["tick"]) for row in read_csv(place / "pings.csv")]
+    assert ticks == [one.tick for one in pings]
+    readme = (place / "README.txt").read_text("utf-8")
+    assert readme.startswith("SIMULATED DATA")
+    assert "  gravity_m_s2: [m/s²] " in readme
+    assert {entry.name for entry in place.iterdir()} == {
+        "README.txt", "budget.csv", "edges.csv", "pings.csv", "runs.csv", "states.csv",
+        "summary.csv",
+    }  # fmt: skip
 
 
-def test_an_existing_session_is_never_imported_into(bring, tmp_path):
-    bring()
-    before = (tmp_path / "imported").read_bytes()
-    assert f"{tmp_path / 'imported'} already exists" in bring(code=2).err
-    assert (tmp_path / "imported").read_bytes() == before
-
-
-def test_channels_that_are_no_gates_are_kept_and_told(bring, call, exported, tmp_path):
-    """An idle input does not spoil a timer's file."""
-    protocol, events = tmp_path / "seven.yaml", tmp_path / "events.csv"
-    text = short().replace("    - {channel: 15, height: 1078 mm}\n", "")
-    protocol.write_text(text, "utf-8")
-    events.write_bytes((exported / "edges.csv").read_bytes())
-    done = bring(events=events, protocol=protocol)
-    assert "edges of channels 15 are kept but belong to no gate" in done.err
-    call("analyze", tmp_path / "imported")
+def test_a_table_has_the_values_of_json(fences, call, tmp_path):
+    """Which columns a scene has is for `tests.cli.test_bundle`."""
+    call("export", fences, "--csv", tmp_path)
+    found = call("analyze", fences, "--json").json
+    for table in ("runs", "summary"):
+        for line, record in zip(read_csv(tmp_path / f"{table}.csv"), found[table], strict=True):
+            cells = [float(line[f"gravity_m_s2{part}"]) for part in ("", "_u", "_U95")]
+            assert cells == [record["gravity_m_s2"][part] for part in ("value", "u", "U95")]
+            if table == "runs":
+                assert line["edges_received"] == str(record["edges"]["received"])

@@ -1,7 +1,6 @@
 """One table of measurands: a row and a function are all that a new one takes."""
 
 import csv
-import json
 
 import pytest
 
@@ -50,7 +49,7 @@ def test_every_row_is_computed_and_speaks_of_itself(name):
 def test_a_new_measurand_appears_wherever_results_do(call, finished, tmp_path, monkeypatch):
     unseen(monkeypatch)
     session = finished.copy(tmp_path)
-    found = json.loads(call("analyze", session, "--json", "--fresh").out)
+    found = call("analyze", session, "--json", "--fresh").json
     for run in found["runs"]:
         assert {"value", "u", "U95"} == set(run[BLOW.name])
         speed = 9.81 * run["fall_time_s"]["value"]

@@ -16,6 +16,7 @@ from rig.errors import InputError
 from rig.files import write_atomic
 from tests.cli.lab import ROOT, command
 from tests.programs import run_program
+from tests.refusals import refused
 from tests.tables import read_table
 from tests.waiting import PATIENCE_S
 
@@ -124,5 +125,4 @@ def test_output_goes_into_any_pipe():
 
 
 def test_nothing_takes_the_place_of_a_session(finished):
-    with pytest.raises(InputError, match="a session is there"):
-        write_atomic(finished.session, "a page")
+    refused(InputError, "a session is there", write_atomic, finished.session, "a page")

@@ -1,19 +1,14 @@
 """Predictions with an initial speed and in air, against the model and against many digits."""
 
-import json
 import math
 from itertools import accumulate
 
 import pytest
 
 from rig.bench.references import exact_coefficients, exact_fall
-from rig.errors import InputError
 from rig.predictions import predictions
-from rig.protocol.reader import parse, read
-from sim.dials import Dials
-from sim.lab import ChainLab
-from tests.cli.lab import PROTOCOLS, short
-from tests.refusals import refused
+from rig.protocol.reader import read
+from tests.cli.lab import PROTOCOLS
 from tests.tables import protocol_text
 
 TIGHT = 1e-13
@@ -32,7 +27,7 @@ def predict(call, tmp_path):
         path.write_text(text, "utf-8")
         done = call("predict", path, "--json")
         assert done.err == ""
-        line, *others = json.loads(done.out)["predictions"]
+        line, *others = done.json["predictions"]
         assert [one["impact_chain"] for one in others] == (["B"] if "impact_chain" in line else [])
         return line
 
@@ -99,20 +94,3 @@ def test_uncertain_speed_and_drag_widen_the_prediction(predict):
         )
         # First order; c goes as the terminal speed to the power of −2.
         assert unsure["speed_u_m_s"] == pytest.approx(abs(high - low) / 2, rel=0.03)
-
-
-def test_what_cannot_be_measured_is_said_and_refused(call, tmp_path):
-    more, why = "initial_speed: 1 m/s", "initial_speed: the rig releases the chains from rest"
-    path, session, events = (tmp_path / name for name in ("p.yaml", "s.session", "e.csv"))
-    path.write_text(f"{short()}{more}\n", "utf-8")
-    events.write_text("run,channel,time_s,state\n1,0,0.1,1\n", "utf-8")
-    done = call("check", path)
-    assert done.err == ""
-    assert f"  note: prediction only: {why}" in done.out.splitlines()
-    for arguments in (
-        ("run", path, "--port", "sim://", "--session", session),
-        ("import", events, "--protocol", path, "--session", session),
-    ):
-        assert f"{path}: prediction only, by {why}" in call(*arguments, code=2).err
-        assert not session.exists()
-    refused(InputError, "prediction only", ChainLab, parse(path.read_text("utf-8")), Dials(), 1)

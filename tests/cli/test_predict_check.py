@@ -1,53 +1,10 @@
 """``rig predict`` and ``rig check``: what follows from a protocol alone, before anything hangs."""
 
-import json
-
 import pytest
 
 from rig.design.trials import Trials
-from rig.predictions import predictions
-from rig.protocol.describe import describe
-from rig.protocol.reader import read
 from tests.cli.lab import PROTOCOLS, short
-from tests.tables import cases, read_table
-
-FIELDS = {*read_table(__file__, "fields")["predictions"]}
-
-
-UNIFORM = PROTOCOLS / "inclined-uniform.yaml"
-
-
-@pytest.fixture
-def predicted(call):
-    """Give what is predicted of a protocol."""
-    return lambda path: json.loads(call("predict", path, "--json").out)["predictions"]
-
-
-def test_json_has_every_field_of_every_incline(predicted):
-    """That the numbers are right is for tests/model and tests/test_predictions.py."""
-    lines = predicted(UNIFORM)
-    assert lines == [one.json() for one in predictions(read(UNIFORM))]
-    assert [line["incline_deg"] for line in lines] == list(range(0, 90, 10))
-    assert all(line.keys() >= FIELDS for line in lines)
-
-
-def test_the_table_says_the_same(call, predicted):
-    """In other units, and with U of 95 % for u."""
-    lines = predicted(UNIFORM)
-    heading, _, *rows = call("predict", UNIFORM).out.splitlines()
-    assert "Δz ± U (cm)" in heading
-    assert max(map(len, (heading, *rows))) <= 80
-    for line, row in zip(lines, rows[: len(lines)], strict=True):
-        incline, alpha, separation, expanded = map(float, row.replace("±", "").split()[:4])
-        assert (incline, alpha) == (line["incline_deg"], pytest.approx(line["alpha"], abs=5e-5))
-        assert separation == pytest.approx(100.0 * line["separation_m"], abs=0.05)
-        assert expanded == pytest.approx(196.0 * line["separation_u_m"], rel=0.06)
-
-
-def test_a_given_alpha_needs_no_surface_numbers(predicted):
-    (line,) = predicted(PROTOCOLS / "bead-chain.yaml")
-    assert (line["alpha"], line["gamma"]) == (0.12, 0.0)
-    assert line["separation_u_m"] > 0.0
+from tests.tables import cases
 
 
 @pytest.fixture
@@ -82,6 +39,7 @@ def test_check_says_what_is_there_and_what_was_left_out(call, protocol):
 def test_a_board_that_lacks_something_is_refused_before_anything_is_hung(
     call, tmp_path, old, new, problem
 ):
+    """That `rig check` says so of boards by name is for tests/protocol."""
     path, session = tmp_path / "p.yaml", tmp_path / "p.session"
     path.write_text(short(repeats=1).replace(old, new), "utf-8")
     done = call("run", path, "--port", "sim://", "--session", session, code=2)
@@ -89,6 +47,3 @@ def test_a_board_that_lacks_something_is_refused_before_anything_is_hung(
     (line,) = done.err.splitlines()
     assert f"{path}:{problem} the board (virtual) has" in line
     assert not session.exists()
-    said = describe(read(path))
-    for word in ("mega", "uno"):
-        assert f"note: board {word} is not suitable: {path}:" in said

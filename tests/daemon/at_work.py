@@ -10,14 +10,7 @@ from rig.daemon.worker import Worker
 from rig.link.messages import RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.recorder.published import PublishedState
-from rig.session.store import Session
 from tests.waiting import PATIENCE_S
-
-
-def states(processes: ProcessFixture) -> list[tuple[int, int, str]]:
-    """Read what the session's log has: run, attempt and state of each entry."""
-    with Session.open(processes.session, readonly=True) as session:
-        return [(e.run, e.attempt, str(e.state)) for e in session.states()]
 
 
 def ended(processes: ProcessFixture, code: int = 0) -> str:

@@ -15,8 +15,8 @@ from rig.link.client import Device
 from rig.link.messages import TABLE, Abort, DropCertificate2, Fire, Phase
 from rig.session.schema import RunState
 from rig.session.store import Session
-from tests.cli.lab import frames_of
-from tests.daemon.at_work import ended, states, working
+from tests.cli.lab import frames_of, log_of
+from tests.daemon.at_work import ended, working
 from tests.refusals import refused
 from tests.waiting import PATIENCE_S, until
 
@@ -66,14 +66,14 @@ def test_what_comes_next_is_the_daemons_to_know(processes, armed):
         refused(InputError, "does not come next", one.arm, run, attempt)
     refused(InputError, "cannot be accepted", one.log_state, 1, 1, RunState.ACCEPTED)
     refused(StoppedError, "tried", one.fire, 0)
-    assert states(processes) == [(1, 1, "armed"), (1, 1, "interrupted")]
+    assert log_of(processes.session) == {1: [(1, "armed"), (1, "interrupted")]}
 
 
 def test_a_client_that_hangs_while_armed_disarms(processes, armed):
     """It is connected, and says nothing any more. Until then the daemon keeps the board armed."""
     processes.await_phase(Phase.ARMED)
     processes.await_phase(Phase.IDLE)
-    until(lambda: states(processes)[-1] == (1, 1, "interrupted"))
+    until(lambda: log_of(processes.session)[1][-1] == (1, "interrupted"))
     with Session.open(processes.session, readonly=True) as session:
         (reason,) = session.latest_state(1).reasons
     assert (reason.code, reason.values["client"]) == ("client_silent", "the driver")
@@ -89,7 +89,9 @@ def test_any_client_stops_a_recording_and_what_there_is_is_kept(processes, armed
     one.fire(token)
     two.stop("enough")
     processes.await_phase(Phase.HOLDING)
-    until(lambda: states(processes)[-1] == (1, 1, "recorded"))  # the daemon has it a little later
+    until(
+        lambda: log_of(processes.session)[1][-1] == (1, "recorded")
+    )  # the daemon has it a little later
     one.close()
     gone_on_with(processes)
     seen = talked(processes, Fire, Abort, DropCertificate2)
@@ -120,8 +122,8 @@ def test_a_stop_after_a_release_that_was_not_answered_keeps_what_fell(unheard):
     processes.await_phase(Phase.HOLDING)
     refused(StoppedError, "", fired.result, PATIENCE_S)
     processes.await_phase(Phase.IDLE)
-    until(lambda: states(processes)[-1] == (1, 1, "recorded"))
-    assert states(processes) == [(1, 1, "armed"), (1, 1, "fired"), (1, 1, "recorded")]
+    until(lambda: log_of(processes.session)[1][-1] == (1, "recorded"))
+    assert log_of(processes.session) == {1: [(1, "armed"), (1, "fired"), (1, "recorded")]}
     seen = talked(processes, Fire, Abort, DropCertificate2)
     assert seen.index(Abort) < seen.index(DropCertificate2)
 
@@ -145,7 +147,7 @@ def test_a_daemon_that_is_asked_to_end_in_the_fall_records_it(processes, armed):
     one.fire(token)
     processes.daemon.send_signal(signal.SIGINT)
     ended(processes)
-    assert states(processes)[-1] == (1, 1, "recorded")
+    assert log_of(processes.session)[1][-1] == (1, "recorded")
     assert not processes.socket.exists()
     processes.start_daemon()
     gone_on_with(processes)

@@ -12,6 +12,7 @@ from bench.process_fixture import ProcessFixture
 from rig.errors import RigError
 from rig.session.store import Session
 from tests.daemon.at_work import ended, let_fall, working
+from tests.refusals import refused
 from tests.waiting import until
 
 
@@ -100,8 +101,7 @@ def test_a_name_that_no_disk_takes_is_refused_with_its_place(processes, caplog):
         for which, length in product(("session", "protocol"), (250, 300)):
             names = {"protocol": str(processes.protocol), "session": str(processes.session)}
             names[which] = str(processes.folder / (length * "x"))
-            with pytest.raises(RigError) as caught:
-                ask(lambda controller, names=names: controller.open_session(**names))
-            assert caught.value.exit_code == 2
-            assert names[which][:50] in str(caught.value)
+            error = refused(RigError, "", ask, lambda rig, names=names: rig.open_session(**names))
+            assert error.exit_code == 2
+            assert names[which][:50] in str(error)
     assert not [record for record in caplog.records if record.exc_info]

@@ -8,7 +8,8 @@ from bench.process_fixture import ProcessFixture
 from rig.errors import RigError
 from rig.link.messages import Phase
 from rig.session.store import Session
-from tests.daemon.at_work import ended, states
+from tests.cli.lab import log_of
+from tests.daemon.at_work import ended
 from tests.waiting import PATIENCE_S, until
 
 IDLE_S = 0.4
@@ -52,7 +53,7 @@ def test_it_stays_while_a_client_is_there_and_disarms_before_it_ends(processes, 
     assert ALONE in ended(processes)
     assert not processes.socket.exists()
     processes.await_phase(Phase.IDLE)
-    assert states(processes) == [(1, 1, "armed"), (1, 1, "interrupted")]
+    assert log_of(processes.session) == {1: [(1, "armed"), (1, "interrupted")]}
 
 
 def test_a_drop_that_only_the_board_has_is_waited_for(processes, driver):
@@ -60,7 +61,7 @@ def test_a_drop_that_only_the_board_has_is_waited_for(processes, driver):
     processes.hand("pull 2")
     driver.close()
     ended(processes)
-    assert states(processes) == [(1, 1, "armed"), (1, 1, "fired"), (1, 1, "recorded")]
+    assert log_of(processes.session) == {1: [(1, "armed"), (1, "fired"), (1, "recorded")]}
 
 
 def test_it_stays_until_the_disk_has_taken_everything(processes, driver):

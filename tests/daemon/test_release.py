@@ -1,15 +1,10 @@
-"""The release tried with nothing hung: really driven, stopped like a drop, and no run of a plan."""
+"""The release tried with nothing hung: really driven, and no run of a plan.
 
-import threading
+What it needs, and what stops it, is for `test_state_space.py`.
+"""
 
-from rig.errors import ControlError, InputError, StoppedError
-from rig.link.messages import Phase, RefusalReason
-from rig.link.refusals import DeviceRefusedError
 from rig.replay import replay
-from rig.session.schema import RunState
 from rig.session.store import Session
-from tests.refusals import refused
-from tests.waiting import until
 
 
 def section(client):
@@ -24,16 +19,6 @@ def driven(processes):
             on = not on
             changes.append((one["after_s"], one["at_s"]))
     return changes
-
-
-def armed(driver):
-    """Arm as soon as the release has rested three times as long as it was on."""
-    try:
-        return driver.arm(1, 1)
-    except DeviceRefusedError as error:
-        if error.reason is not RefusalReason.COOLING:
-            raise
-        return 0
 
 
 def test_it_is_driven_for_the_protocols_pulse_and_is_no_run(processes, driver):
@@ -52,38 +37,3 @@ def test_it_is_driven_for_the_protocols_pulse_and_is_no_run(processes, driver):
         assert [(drop.run, drop.attempt) for drop in session.drops()] == [(1, 1)]
         assert {entry.run for entry in session.states()} == {1}
         assert "DIFFERENT" not in replay(session).lines[0]
-
-
-def test_it_needs_control_a_session_nothing_armed_and_a_closed_emergency_stop(processes, client):
-    one, other = client("one"), client("other")
-    one.take_control()
-    refused(InputError, "not the moment", one.call, "test_release")
-    one.open_session(str(processes.protocol), str(processes.session))
-    refused(ControlError, "", other.call, "test_release")
-    one.arm(1, 1)
-    refused(InputError, "not the moment", one.call, "test_release")
-    processes.hand("stop 1")
-    until(lambda: one.session.latest_state(1).state is RunState.INTERRUPTED)
-    error = refused(DeviceRefusedError, "", one.call, "test_release")
-    assert error.reason is RefusalReason.STOPPED
-    assert not driven(processes)
-
-
-def test_stop_ends_it(processes, driver, client):
-    watcher, raised = client("a watcher"), []
-
-    def test():
-        try:
-            driver.call("test_release")
-        except StoppedError as error:
-            raised.append(error)
-
-    testing = threading.Thread(target=test)
-    testing.start()
-    processes.await_phase(Phase.RECORDING)
-    watcher.stop("enough")
-    testing.join()
-    assert raised
-    assert section(driver) is None
-    processes.await_phase(Phase.IDLE)
-    until(lambda: armed(driver))  # nothing is left behind that forbids it

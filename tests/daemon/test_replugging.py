@@ -16,6 +16,7 @@ from rig.session.store import Session
 from tests.daemon.at_work import let_fall, working
 from tests.daemon.far_port import FarPort
 from tests.flash.pty_board import info
+from tests.refusals import refused
 from tests.waiting import until
 
 
@@ -63,8 +64,7 @@ def test_another_board_where_it_was_is_not_taken_for_it(usb, numbers):
             processes.port.symlink_to(other.port)
             until(lambda: "another board" in str(worker.published.get("error")))
             assert "give the same rig run command again" in worker.published.get("error")["hint"]
-            with pytest.raises(DeviceError, match="no connection"):
-                ask(lambda controller: controller.arm(2, 1))
+            refused(DeviceError, "no connection", ask, lambda controller: controller.arm(2, 1))
             # Whoever means it says so by giving the command again.
             ask(lambda controller: controller.open_session(str(other.protocol), str(other.session)))
             assert worker.published.get("link")["state"] == "up"
@@ -83,11 +83,9 @@ def test_the_same_command_finds_it_too_when_nothing_is_where_it_was(usb):
             controller.open_session(str(processes.protocol), str(processes.session))
             assert controller.published.get("port")["path"] == os.path.realpath(elsewhere)
         usb[elsewhere] = "999"
-        with (
-            closing(Controller(str(processes.port), PublishedState())) as controller,
-            pytest.raises(DeviceError, match="no such"),
-        ):
-            controller.open_session(str(processes.protocol), str(processes.session))
+        with closing(Controller(str(processes.port), PublishedState())) as controller:
+            names = str(processes.protocol), str(processes.session)
+            refused(DeviceError, "no such", controller.open_session, *names)
 
 
 @pytest.mark.parametrize(

@@ -18,11 +18,10 @@ from rig.daemon.client import AsyncClient, Line
 from rig.daemon.listener import Door
 from rig.daemon.socket_path import default_socket, peer_uid, prepare_folder
 from rig.errors import BusyError, DeviceError, InputError, RigError, VersionError
+from tests.daemon.test_api_page import rows
 from tests.refusals import refused
-from tests.tables import cases, read_table
+from tests.tables import cases
 from tests.waiting import PATIENCE_S
-
-_SECTIONS = {*read_table(__file__, "sections")}
 
 
 async def told(path, *lines):
@@ -123,7 +122,7 @@ async def test_an_endless_line_ends_the_connection_and_not_the_daemon(door):
 async def test_a_snapshot_has_every_section_that_is_promised(door):
     client = await AsyncClient.connect(door.path, "tui")
     await client.call("subscribe")
-    assert set(client.replica.state) == _SECTIONS
+    assert sorted(client.replica.state) == sorted(rows("State"))
     assert client.replica.state["port"] == {
         "url": "sim://", "simulated": True, "path": "sim://",
     }  # fmt: skip

@@ -15,8 +15,8 @@ from unittest.mock import Mock
 import pytest
 
 from rig.daemon.worker import STALL_S
-from rig.errors import SessionError, StoppedError
-from rig.link.messages import TEST_RUN, Arm, Phase, pack_label
+from rig.errors import ControlError, SessionError, StoppedError
+from rig.link.messages import TEST_RUN, Arm, Phase, RefusalReason, pack_label
 from rig.recorder.controller import Controller
 from rig.recorder.published import PublishedState
 from tests.daemon.rig_in_a_box import Box, Trouble
@@ -181,12 +181,34 @@ def test_a_test_of_the_release_tells_what_was_seen_of_it(box):
     assert seen["release_sense_s"] == pytest.approx(0.012, rel=0.01)
 
 
-def test_a_stop_before_a_test_of_the_release_lets_nothing_go(box, monkeypatch):
-    """Also where no ABORT goes past the worker, as at a simulated board."""
+def test_a_test_of_the_release_needs_control_a_session_nothing_armed_and_a_closed_stop(box):
+    def tried(client="A"):
+        return box.asked(lambda c: c.test_release(), client)
+
+    assert isinstance(tried("B"), ControlError)
+    box.arm()
+    assert "not the moment" in str(tried())
+    box.board.stop(True)
+    box.passed(0.1)
+    assert tried().reason is RefusalReason.STOPPED
+    box.board.stop(False)
+    box.asked(lambda c: c.close_session())
+    assert "not the moment" in str(tried())
+    assert box.fell == []
+
+
+@pytest.mark.parametrize("deeds", [1, 2])
+def test_a_stop_ends_a_test_of_the_release(box, monkeypatch, deeds):
+    """Behind ARM, and behind FIRE; also where no ABORT goes past the worker."""
     monkeypatch.setattr(box.worker, "_abort_past", lambda: False)
-    box.trouble = Trouble("stopped", "written")  # ARM
+    box.board.lab.drop = Mock(return_value=[])
+    box.trouble = Trouble("stopped", "written", deeds)
     assert isinstance(box.asked(lambda c: c.test_release()), StoppedError)
-    assert (box.fell, box.phase) == ([], Phase.IDLE)
+    assert box.board.lab.drop.called == (deeds == 2)
+    assert (box.board.outputs(), box.phase) == (0, Phase.IDLE)
+    assert box.worker.published.get("release_test") is None
+    box.passed(1.0)
+    assert isinstance(box.arm(), int), "nothing is left behind that forbids it"
 
 
 def test_what_was_heard_of_a_port_that_is_gone_is_on_the_disk(box):

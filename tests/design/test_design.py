@@ -19,7 +19,7 @@ from rig.protocol import reader
 from rig.protocol.protocol import Condition, Gate, Gates, Plan, Priors, Protocol
 from rig.protocol.reader import parse
 from rig.vocabulary import OBJECT, TWO_CHAINS
-from tests.analysis.drops import SINGLE, UNIFORM
+from tests.analysis.drops import PROTOCOLS, SINGLE, UNIFORM
 from tests.analysis.test_datum_board import from_board, raised
 from tests.estimate.sessions import DIALS, analysis, forms
 from tests.tables import protocol_text
@@ -212,3 +212,28 @@ def test_no_digit_is_lost_to_sharp_edges_or_extreme_priors(name):
     # What is held is given without any prior; where one alone is, the other is given with it.
     assert found.held in (set(), set(now))
     assert [found.coefficients[name] for name in now] == pytest.approx(u, rel=1e-9)
+
+
+def test_the_command_proposes_heights_and_writes_them(call, tmp_path):
+    fence = PROTOCOLS / "picket-fence.yaml"
+    new = tmp_path / "new.yaml"
+    done = call("design", fence, "--lowest", "40 mm", "--spacing", "5 cm", "-o", new)
+    (line,) = re.findall(r"^proposed \(mm\): (.*)$", done.out, re.MULTILINE)
+    proposed = [float(one) * 1e-3 for one in line.split(", ")]
+    told = float(re.findall(r"sweep \d: uncertainties × (\S+) in", done.err)[-1])
+    (pair,) = re.findall(r"^g of one run .* (\S+) +(\S+)$", done.out, re.MULTILINE)
+    assert told == pytest.approx(float(pair[1]) / float(pair[0]), rel=0.1)
+    assert "±" not in done.out
+    written, before = (
+        [gate.height for gate in reader.read(path).gates.gates] for path in (new, fence)
+    )
+    assert sorted(written) == pytest.approx(sorted(proposed), abs=0.06e-3)
+    assert written != before
+    changed = [
+        (old, now) for old, now in zip(fence.read_text("utf-8").splitlines(),
+                                       new.read_text("utf-8").splitlines(), strict=True)
+        if old != now
+    ]  # fmt: skip
+    assert 1 <= len(changed) <= len(proposed)
+    assert all("height: " in old and "height: " in now for old, now in changed)
+    call("design", fence, "--no-search", "-o", new, code=2)

@@ -1,6 +1,5 @@
 """What the doctor finds on a computer, a board and in a session, and the command as a whole."""
 
-import json
 import os
 import random
 import re
@@ -25,6 +24,7 @@ from rig.selftest.findings import Verdict, make_check
 from rig.selftest.run import run_checks
 from rig.session.store import Session
 from tests.flash.pty_board import PtyBoard, silent_port
+from tests.refusals import refused
 from tests.selftest.benches import LoopedBoard, fire_drop, hold_drop, port_of, wired
 from tests.selftest.broken import claims, odd
 from tests.session.altering import alter
@@ -262,7 +262,7 @@ def test_programs_read_codes(finding, doctor, tmp_path):
     done = doctor("--json", "--session", tmp_path / "none", code=4)
     assert done.err == "1 thing to do\n"
     name = f"session {tmp_path / 'none'}"
-    assert json.loads(done.out)["findings"][-1] == {"name": name, **finding}
+    assert done.json["findings"][-1] == {"name": name, **finding}
 
 
 def test_a_restart_in_a_drop_is_timed_and_found_again_in_the_session(doctor, tmp_path):
@@ -275,8 +275,7 @@ def test_a_restart_in_a_drop_is_timed_and_found_again_in_the_session(doctor, tmp
         said = (
             r"the board restarted about [45] ms after FIRE: is its supply shared with the magnets\?"
         )
-        with pytest.raises(DeviceError, match=said):
-            device.collect(label)
+        refused(DeviceError, said, device.collect, label)
     done = doctor("--session", path, code=4)
     found = (
         r"^restarts: failed: run 3, attempt 2: about [45] ms after FIRE \(brown-out\)\n  do: is "

@@ -19,6 +19,7 @@ from tests.analysis.drops import FENCE, UNIFORM, case
 from tests.analysis.sessions import MILD, cases
 from tests.analysis.sessions import analysis as analyzed
 from tests.estimate.sessions import BETA, MU, analysis, forms
+from tests.refusals import refused
 
 SURFACE = (30.0, 50.0, 70.0)
 """What is known of impulses that are nearly alike, and of strings that hardly stretch: else a few
@@ -103,8 +104,8 @@ def test_without_priors_the_posterior_is_the_least_squares_fit():
 
 
 def test_where_nothing_strikes_there_is_nothing_to_estimate():
-    with pytest.raises(InputError, match="no coefficients"):
-        estimate(FENCE, analyzed(cases((1, 2), scene="fence")))
+    drops = analyzed(cases((1, 2), scene="fence"))
+    refused(InputError, "no coefficients", estimate, FENCE, drops)
 
 
 def test_good_drops_that_no_motion_fits_are_left_out_and_named():
@@ -118,8 +119,8 @@ def test_good_drops_that_no_motion_fits_are_left_out_and_named():
         f"run {out} is left out: no motion fits its edges, or not together with the other runs; "
         "rig analyze SESSION says which"
     ]
-    with pytest.raises(InputError, match="no motion fits the edges of any good drop"):
-        estimate(UNIFORM, replace(drops, adjusted={}))
+    none = replace(drops, adjusted={})
+    refused(InputError, "no motion fits the edges of any good drop", estimate, UNIFORM, none)
 
 
 def dropped(protocol, inclines, each):

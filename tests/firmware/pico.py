@@ -31,13 +31,3 @@ def symbol(name):
     return next(
         int(line.split()[0], 16) for line in table.splitlines() if line.endswith(f" {name}")
     )
-
-
-def programs():
-    """Read the words that PIO runs out of the image."""
-    build()
-    image = (FOLDER / "firmware.bin").read_bytes()
-    # The part that is copied to RAM begins where its first vector says the stack ends, again.
-    first = image[0x100:0x104]
-    at = image.index(first, 0x104) + symbol("programs") - symbol("load_to")
-    return [int.from_bytes(image[n : n + 2], "little") for n in range(at, at + 64, 2)]

@@ -1,13 +1,17 @@
-"""The photogate as drawn: `rig gate` against ngspice, and its resistors against the pages."""
+"""The photogate as drawn: `rig gate` against ngspice, and its resistors, which can be bought."""
 
 from pathlib import Path
 
 import pytest
+from hypothesis import given
 
 from rig.errors import InputError
 from rig.model import photogate
+from rig.model.photogate import next_standard
 from tests.firmware.toolchain import FIRMWARE, need
+from tests.model.chains import decades
 from tests.programs import run_program
+from tests.refusals import refused
 
 NAMED = {"distance_m": 0.06, "slit_m": 0.5e-3, "led": "TSAL6100", "detector": "BPW85C"}
 DECK = Path(__file__).with_name("photogate.cir").read_text("ascii")
@@ -52,8 +56,8 @@ def test_a_gate_of_every_pair_is_lit_at_half_of_what_its_led_bears():
 
 
 def test_too_little_light_is_said():
-    with pytest.raises(InputError, match="too little light"):
-        photogate.design_photogate(**{**NAMED, "detector": "BPW85", "led": "TSAL6400"})
+    dark = {**NAMED, "detector": "BPW85", "led": "TSAL6400"}
+    refused(InputError, "too little light", photogate.design_photogate, **dark)
 
 
 @pytest.mark.parametrize("board", ["rp2040", "atmega2560", "atmega328p"])
@@ -63,3 +67,13 @@ def test_the_drawing_has_the_resistors_that_were_computed(board):
     assert f"{gate['load resistor, Ω'] / 1e3:g} kΩ" in drawing
     assert f"{gate['LED resistor, Ω']:g} Ω" in drawing
     assert "74HC14" not in drawing
+
+
+SERIES = [1.0, 1.2, 1.5, 1.8, 2.2, 2.7, 3.3, 3.9, 4.7, 5.6, 6.8, 8.2]  # E12 of IEC 60063
+
+
+@given(decades(0, 6))
+def test_a_resistor_is_the_next_one_of_its_series(ohm):
+    all_there_are = [first * 10.0**power for power in range(8) for first in SERIES]
+    wanted = min(one for one in all_there_are if one > 0.999 * ohm)
+    assert next_standard(ohm) == pytest.approx(wanted, rel=1e-9)

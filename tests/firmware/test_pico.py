@@ -15,6 +15,7 @@ from tests.firmware.toolchain import FIRMWARE
 from tests.link.bench import Bench, ScriptedLab
 from tests.link.conformance import DeviceConformance
 from tests.link.talk import record_drop
+from tests.refusals import refused
 from tests.tables import cases
 
 HZ = 20_000_000
@@ -40,9 +41,7 @@ class PicoBench(Bench):
 @cases
 def test_without_its_emulator_it_says_what_to_install(monkeypatch, tmp_path, patched, named, hint):
     monkeypatch.setattr(patched, tmp_path if "HERE" in patched else lambda _: None)
-    with pytest.raises(InputError, match=named) as caught:
-        open_port("emu://?board=pico")
-    assert hint in caught.value.hint
+    assert hint in refused(InputError, named, open_port, "emu://?board=pico").hint
 
 
 @pytest.mark.slow

@@ -50,8 +50,3 @@ def test_the_picture_is_up_to_date(board, tmp_path):
     draw(read_pins(board), tmp_path / "it.svg")
     now = (tmp_path / "it.svg").read_bytes()
     assert now == (FIRMWARE / board / "wiring.svg").read_bytes(), "python firmware/pictures.py"
-
-
-def test_links_lead_somewhere():
-    for target in re.findall(r"\]\(([^)#]+)\)", README):
-        assert (FIRMWARE / target).exists(), target

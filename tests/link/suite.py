@@ -9,6 +9,7 @@ from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Incoming
 from rig.records import Drop
 from tests.link.bench import GATES, Bench, ScriptedLab, falling_rods
+from tests.refusals import refused
 
 
 class Suite:
@@ -51,11 +52,10 @@ class Suite:
         assert abs(ticks - expected) <= bench.tick_tolerance + 0.005 * expected
 
     def refused(self, reason: wire.RefusalReason, call, *args, **kwargs) -> DeviceRefusedError:
-        with pytest.raises(DeviceRefusedError) as caught:
-            call(*args, **kwargs)
-        assert caught.value.reason is reason
-        assert caught.value.hint
-        return caught.value
+        error = refused(DeviceRefusedError, "", call, *args, **kwargs)
+        assert error.reason is reason
+        assert error.hint
+        return error
 
     def heard(self, bench: Bench, device: Device, seconds: float) -> list[wire.Message]:
         """Listen in silence to what the device says of its own accord."""
@@ -74,6 +74,5 @@ class Suite:
         """Press reset, and see that the device says so and is who it was."""
         identity = device.transcript.identity
         bench.reset()
-        with pytest.raises(DeviceError, match="restarted"):
-            self.heard(bench, device, 3.0)
+        refused(DeviceError, "restarted", self.heard, bench, device, 3.0)
         assert device.connect(boot_wait_s=0) == identity

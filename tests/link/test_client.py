@@ -160,8 +160,8 @@ def test_a_flood_from_who_knows_whom_is_ended_after_a_mebibyte(clock, noise):
     port, kept = FakePort(clock, {}), []
     port.read = lambda size: clock.sleep(1e-4) or noise[:size]
     port.out = noise  # what waits
-    with pytest.raises(DeviceError, match=r"1\.\d MB of bytes that are no frames"):
-        Device(port, clock, tap=lambda _way, _ns, data: kept.append(len(data))).connect()
+    one = Device(port, clock, tap=lambda _way, _ns, data: kept.append(len(data)))
+    refused(DeviceError, r"1\.\d MB of bytes that are no frames", one.connect)
     assert sum(kept) <= STRANGE_BYTES + 2 * len(noise)
 
 
@@ -447,17 +447,15 @@ def test_what_has_arrived_is_counted():
             assert port.in_waiting == 0
             assert port.read(1) == b""  # nobody sends any more, and nothing is waited for
         port.close()
-    with pytest.raises(OSError):
-        assert port.in_waiting
+    refused(OSError, "", getattr, port, "in_waiting")
 
 
 def test_nothing_listens():
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         number = free.getsockname()[1]
-    with pytest.raises(DeviceError, match=f":{number}: Connection refused") as caught:
-        open_port(f"socket://127.0.0.1:{number}")
-    assert "HOST:PORT" in caught.value.hint
+    nobody = f"socket://127.0.0.1:{number}"
+    assert "HOST:PORT" in refused(DeviceError, f":{number}: Connection ref", open_port, nobody).hint
 
 
 @pytest.mark.parametrize("url", ["socket://lab", "socket://127.0.0.1:99999", "socket://"])

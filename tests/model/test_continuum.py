@@ -11,8 +11,10 @@ from mpmath import mp
 from rig.bench.references import continuum, many_digits
 from rig.errors import DomainError
 from rig.model.continuum import UniformChain, end, end_speed, separation_leading_order
+from rig.model.quadrature import gauss
 from tests.examples import examples
 from tests.model.chains import ALPHAS, close, decades
+from tests.refusals import refused
 from tests.tables import cases
 
 # A sum of some hundred positive terms, each of a dozen roundings; 4e-15 is the worst seen.
@@ -58,8 +60,7 @@ def test_the_speed_at_the_end_is_equation_14(length, reach, alpha, drop, gravity
 
 @cases
 def test_says_what_is_wrong_with_a_chain(change, message):
-    with pytest.raises(DomainError, match=message):
-        replace(PAPER, **change)
+    refused(DomainError, message, replace, PAPER, **change)
 
 
 def printed_15(alpha, length, reach):
@@ -97,3 +98,9 @@ def test_without_gravity_it_is_equation_s17(length, ratio, alpha, start, drop):
         found.separation_m, abs=1e-12 * length
     )
     assert found.time_s == pytest.approx(found.lay_down_s + drop / start, rel=1e-14)
+
+
+def test_rules_are_shared_and_cannot_be_spoilt():
+    assert gauss(7) is gauss(7)
+    with pytest.raises(ValueError, match="read-only"):
+        gauss(7).weights[0] = 0.0

@@ -22,8 +22,10 @@ from rig.protocol.protocol import Priors, Run
 from rig.protocol.reader import parse, read
 from rig.protocol.site import gravity_at
 from rig.protocol.yamltree import load, place_of
-from tests.analysis.drops import FENCE, UNIFORM, case
+from rig.units import Quantity
+from tests.analysis.drops import UNIFORM, case
 from tests.protocol.test_protocol_reader import GOOD
+from tests.refusals import refused
 from tests.tables import cases, protocol_text
 
 TWO = protocol_text("two-chains")
@@ -101,12 +103,6 @@ def test_rig_check_lists_them_all_and_marks_those_of_the_protocol():
         assert ("(stated)" in line) == (name == "hang")
 
 
-def test_rig_check_lists_none_that_nothing_depends_on():
-    """A fence falls freely, and its cards are level."""
-    listed = {line.split()[0] for line in describe(FENCE).splitlines() if line.startswith("  ")}
-    assert listed & {*PRIORS} == {"edge_floor", "jitter", "hang", "drag"}
-
-
 def test_an_adjustment_takes_what_the_protocol_states():
     wide = scene(
         "{hang: 3 mm, side: 5 mm, beam_offset: 10 mm, drag: 0.5, impulses: 50 %, departure: 2 mm}"
@@ -140,8 +136,8 @@ def test_a_recording_outlasts_the_fall(text):
 def test_a_fall_that_no_board_can_record_is_refused_beforehand():
     protocol = parse(ENDLESS, "f")
     assert measurable.record_ms(protocol) > LONGEST_RECORD_MS
-    with pytest.raises(InputError, match=r"f:7:7: drop: from here .* at most 65.535 s"):
-        measurable.check_recordable(protocol)
+    said = r"f:7:7: drop: from here .* at most 65.535 s"
+    refused(InputError, said, measurable.check_recordable, protocol)
     measurable.check_measurable(protocol)  # what another timer recorded is not refused
     note = "note: cannot be recorded: f:7:7: drop: from here a drop takes up to 63.6 s"
     assert note in describe(protocol)
@@ -189,3 +185,46 @@ def test_a_place_that_is_not_there_is_that_of_what_is_around_it():
     assert place_of(tree, "b", "c", 7) == place_of(tree, "b", "c")
     assert place_of(tree, "b", "x", "y") == place_of(tree, "b")
     assert place_of(tree, "x").line == 1
+
+
+HEIGHTS = "{drop: [180 mm ± 1 mm, 228.5 mm ± 2 mm]}"
+
+
+def vary(words: str):
+    text = GOOD.replace("drop: 180 mm ± 2 mm", "") if "drop" in words else GOOD
+    return parse(text.replace("repeats: 4", f"vary: {words}, repeats: 4"), "f")
+
+
+def test_every_setting_is_a_scene_of_its_own_with_its_own_runs():
+    protocol = vary(HEIGHTS)
+    scenes = protocol.settings
+    heights = [Quantity(0.18, 1e-3), Quantity(0.2285, 2e-3)]
+    assert [scene.drop for scene in scenes.values()] == heights
+    planned = runs(protocol)
+    assert [run.setting for run in planned[::4]] == [*scenes] * 2
+    assert len(planned) == 2 * len(runs(parse(GOOD)))
+    assert all(protocol.of(run) == scenes[run.setting] for run in planned)
+    assert protocol.with_gates(()).of(planned[-1]).gates.gates == ()
+
+
+def test_keys_are_varied_together_and_need_not_be_stated_elsewhere():
+    scenes = vary("{drop: [100 mm, 200 mm], surface.friction: [0.1, 0.2, 0.3]}").settings
+    values = [(scene.drop.value, scene.surface.friction.value) for scene in scenes.values()]
+    assert values == [(drop, friction) for drop in (0.1, 0.2) for friction in (0.1, 0.2, 0.3)]
+
+
+def test_what_only_another_setting_has_wrong_is_told_with_it():
+    problems = refused(InputError, "", vary, "{drop: [180 mm, 26 mm]}").problems
+    assert [problem.line for problem in problems] == [10, 11]
+    for problem in problems:
+        assert "rod 1 of A blocks before the release" in problem.message
+        assert problem.message.endswith("(drop 26 mm)")
+
+
+@pytest.mark.parametrize("count", [100, 101])
+def test_settings_are_counted_before_they_are_read(count):
+    words = f"{{surface.friction: [{', '.join(f'0.{200 + n}' for n in range(count))}]}}"
+    if count <= 100:
+        assert len(vary(words).settings) == count
+    else:
+        refused(InputError, "more than 100 settings", vary, words)

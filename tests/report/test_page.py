@@ -20,6 +20,7 @@ from rig.wordings import OPERATOR
 from tests.cli.lab import ROOT, record, short_fence
 
 VOID_TAGS = {"meta", "br", "hr", "img", "link"}
+LOADING = ("href", "src", "srcset", "data", "action", "poster")
 BAD = '<script>alert("x")</script>&\'</pre></style>'
 
 
@@ -31,7 +32,7 @@ class Balance(HTMLParser):
     def handle_starttag(self, tag, attrs):
         values = dict(attrs)
         self.ids += [values["id"]] if "id" in values else []
-        self.links += [values[key] for key in ("href", "src") if key in values]
+        self.links += [values[key] for key in LOADING if key in values]
         if tag not in VOID_TAGS:
             self.open.append(tag)
 
@@ -68,6 +69,9 @@ def test_the_page_is_whole_and_needs_nothing_else(plain):
     assert len(parser.ids) == len(set(parser.ids))
     places = [link[1:] for link in parser.links if not link.startswith("data:")]
     assert set(places) <= set(parser.ids)
+    assert not re.search(r"@import|url\((?!\s*[\"']?#)|<script |<link|<iframe|<object", plain)
+    assert "default-src 'none'" in plain
+    assert not re.findall(r"https?://(?!www\.w3\.org/)[^\s<]*", plain)
     (script,) = re.findall(r"<script>(.*?)</script>", plain, re.DOTALL)
     digest = base64.b64encode(sha256(script.encode()).digest()).decode()
     assert f"script-src 'sha256-{digest}'" in plain

@@ -1,6 +1,5 @@
 """A board that is in order passes, and for every check there is one broken in just that way."""
 
-import json
 from dataclasses import replace
 from functools import partial
 from unittest.mock import Mock
@@ -18,6 +17,7 @@ from rig.selftest.run import CHECKS, run_checks, selftest
 from sim.controller import Microcontroller
 from tests.flash.pty_board import PtyBoard
 from tests.link.talk import arm
+from tests.refusals import refused
 from tests.selftest.benches import GATE, LoopedBoard, hold_drop, outcomes, port_of, wired
 from tests.selftest.broken import BROKEN, claims, odd
 from tests.tables import cases
@@ -108,7 +108,7 @@ def test_a_gate_in_use_that_is_blocked_or_not_there_fails(
 
 def test_json_lists_each_check_with_its_codes(rig):
     done = rig("--port", FENCE, "--loopback", "2", "--drops", "1", "--json", code=4)
-    listed = {entry.pop("name"): entry for entry in json.loads(done.out)["checks"]}
+    listed = {entry.pop("name"): entry for entry in done.json["checks"]}
     assert list(listed) == list(CHECKS)
     assert listed["bad requests"] == {"verdict": "ok", "what": "", "advice": "", "reason_codes": []}
     codes = {name: (entry["verdict"], entry["reason_codes"]) for name, entry in listed.items()}
@@ -142,8 +142,8 @@ def test_a_drop_of_a_session_is_left_alone(monkeypatch):
     again = Device(port, port.clock)
     again.connect(boot_wait_s=0)
     assert again.fetch(label) == drop
-    with pytest.raises(DeviceError, match="still holds the drop of run 7"):
-        arm(again, label)  # no ABORT made it free to be discarded
+    # No ABORT made it free to be discarded.
+    refused(DeviceError, "still holds the drop of run 7", arm, again, label)
 
 
 def test_a_drop_that_an_earlier_test_left_is_cleared_away():

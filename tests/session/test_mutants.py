@@ -72,8 +72,8 @@ def test_recover_tells_of_any_session_and_calls_none_whole_that_cannot_be_read(m
 def test_a_file_of_another_build_is_refused_before_a_row_is_read(sql, copied, call):
     run_sql(copied, sql)
     for readonly in (True, False):
-        with pytest.raises(SessionError, match="built or altered by another program"):
-            Session.open(copied, readonly=readonly)
+        said = "built or altered by another program"
+        refused(SessionError, said, Session.open, copied, readonly=readonly)
     assert "rig cannot read it" in call("recover", copied, code=SessionError.exit_code).out
 
 
@@ -128,7 +128,7 @@ def test_edges_that_cannot_be_are_kept_and_void(ticks, tmp_path, call):
         account = Certificate(COUNT + 1, crc32=1, glitches=1)
         opened.add_drop(Drop(1, 2, HZ, edges, 5, 0, account), provenance="device")
         opened.add_state(1, 2, RunState.RECORDED, 10**12)
-    (run,) = json.loads(call("analyze", "--json", session, code=3).out)["runs"]
+    (run,) = call("analyze", "--json", session, code=3).json["runs"]
     assert run["verdict"] == "void"
     assert run["reasons"]
     with Session.open(session, readonly=True) as opened:

@@ -12,6 +12,7 @@ from sim.dials import Dials
 from sim.lab import ChainLab
 from sim.truth import Truth
 from tests.examples import examples
+from tests.refusals import refused
 from tests.sim.falls import DELAY, UNIFORM, ByHand, crossings, free_time_down
 
 QUIET = Dials.quiet()
@@ -89,5 +90,4 @@ def test_a_drop_depends_on_seed_run_and_attempt_alone(asked, order: random.Rando
 def test_a_run_the_plan_does_not_have_is_bad_input():
     lab = ChainLab(UNIFORM, QUIET, 1)
     for ask in (lab.drop, lab.rest):
-        with pytest.raises(InputError, match="no run 109"):
-            ask(pack_label(109, 1))
+        refused(InputError, "no run 109", ask, pack_label(109, 1))

@@ -1,7 +1,6 @@
 """Boards on USB: which ports are candidates, and the rule and units that open them."""
 
 import configparser
-import json
 import re
 import runpy
 import shutil
@@ -17,6 +16,7 @@ from rig.flash.drive import pico_ports
 from rig.usb.listing import KNOWN, Known, SerialPort, path_of, serial_number_at, serial_ports
 from tests.flash.pty_board import PtyBoard, info
 from tests.programs import run_program
+from tests.refusals import refused
 from tests.tables import cases, read_table
 
 PACKAGING = Path(__file__).parents[2] / "packaging"
@@ -39,7 +39,7 @@ def never(monkeypatch):
 @cases
 def test_candidates_come_first_and_the_others_say_why_not(candidate, lines, plugged, never, call):
     assert call("ports").out.splitlines() == lines
-    first, *rest = json.loads(call("ports", "--json").out)["ports"]
+    first, *rest = call("ports", "--json").json["ports"]
     assert first == candidate
     assert not any(port["candidate"] for port in rest)
     plugged()
@@ -90,8 +90,8 @@ def test_a_pico_with_another_program_is_not_opened(plugged):
 
 def test_copies_that_share_a_number_are_not_confused(plugged):
     plugged(info("/dev/ttyUSB0", serial_number="0001"), info("/dev/ttyUSB1", serial_number="0001"))
-    with pytest.raises(DeviceError, match="/dev/ttyUSB0 and /dev/ttyUSB1 have the same"):
-        path_of("0001", serial_ports())
+    said = "/dev/ttyUSB0 and /dev/ttyUSB1 have the same"
+    refused(DeviceError, said, path_of, "0001", serial_ports())
 
 
 @pytest.mark.parametrize("first", KNOWN, ids=lambda kind: kind.name)
