@@ -307,8 +307,7 @@ class SideFall:
     def unknowns(self, falls: Array) -> Array:
         """Return the drop's unknowns for falls released at time zero, shape ``(…, unknowns)``."""
         x = np.zeros((*falls.shape[:-1], len(self.model.unknowns)))
-        x[..., self.columns] = falls * self.sd
-        x[..., self.columns[RELEASE]] = 0.0
+        x[..., self.columns[START:]] = (falls * self.sd)[..., START:]
         x[..., self.columns[ALPHA:]] += self.record.alpha
         return x
 

@@ -179,7 +179,7 @@ def _later_passages(record: ChainRecord, seen: Flags, path: Trajectory, gravity:
             # Each shadow begins as the beam darkens and ends with the next edge.
             shadow = dark[:-1] & ~dark[1:]
             shadow &= np.diff(times) * speed * WIDER >= min(record.chain.widths)
-            begins = begins[:-1][shadow[1:]]
+            begins = 1 + np.flatnonzero(shadow[1:])
             ends = begins + 1
         paired = times[begins[1:]] - times[ends[:-1]] < 2.0 * speed * WIDER / gravity
         later = np.append(paired, True) | np.append(False, paired)

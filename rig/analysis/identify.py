@@ -210,14 +210,14 @@ def _read(fall: SideFall, earliest: float, batches: int | None) -> list[FallFit]
     """Anneal batches of starts until a reading explains the edges; the likeliest first."""
     readings: list[FallFit] = []
     least, matchable = LEAST * fall.record.edge_count, possible(fall.record)
+    enough = max(least, _CLEAR * matchable)
     if not fall.record.edges.times.size or matchable < least:
         return readings
     for starts in itertools.islice(fall.starts(earliest, least), batches):
         if len(starts):
             readings = _rank_readings([*readings, *fall.anneal(starts, _CLOSE)])
             best = readings[0]
-            many = count_matched(*best.matches) >= max(least, _CLEAR * matchable)
-            if many and best.scatter < RESTLESS:
+            if best.scatter < RESTLESS and count_matched(*best.matches) >= enough:
                 break
     return readings
 

@@ -194,12 +194,11 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
             break
         x, groups, residuals = moves
         inverse = np.linalg.inv(root.matrix).astype(np.float64, copy=False)
-        moved = length(step, root.matrix) / math.sqrt(size)
         before = evidence.components
         evidence = Evidence(before, beforehand)
         evidence.edges(residuals)
         _weigh(evidence, shared, x, sd, inverse, groups)
-        settled = moved < _DONE
+        settled = length(step, root.matrix) < _DONE * math.sqrt(size)
         rests = rests + 1 if settled else 0
         if settled and _steady(before, evidence.components, groups):
             break
@@ -207,8 +206,8 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
         grown = before.ratios(evidence.components)
         last, previous = previous, np.append(step, grown)
         if round_ > _FIRST:
-            pace[size:] *= _FASTER
-            pace[previous * last < 0.0] *= _SLOWER
+            pace *= np.where(previous * last < 0.0, _SLOWER, _FASTER)
+            pace[:size] = np.minimum(pace[:size], 1.0)
         leap = np.maximum(np.abs(grown), 1.0)  # only small changes are made faster
         evidence.components = before.times(np.clip(pace[size:] * grown, -leap, leap))
     gains = defaultdict[str, Array](partial(np.zeros, (size, size)))
