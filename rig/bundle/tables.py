@@ -124,7 +124,8 @@ def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
     """Spread a JSON object over columns.
 
     A quantity ``x`` becomes ``x``, ``x_u`` and ``x_U95``; members of other objects get its name
-    in front; lists of text are joined with semicolons; lists of objects are left out.
+    in front; lists of text are joined with semicolons, as are the codes of reasons; lists of other
+    objects are left out.
     """
     columns: dict[str, object] = {}
     for key, value in record.items():
@@ -132,8 +133,9 @@ def flatten(record: Mapping[str, Any], prefix: str = "") -> dict[str, object]:
         if isinstance(value, dict):
             columns |= flatten(value, f"{name}_")
         elif isinstance(value, list):
-            if dict not in map(type, value):
-                columns[name] = "; ".join(map(str, value))
+            texts = [item.get("code") if isinstance(item, dict) else item for item in value]
+            if None not in texts:
+                columns[name] = "; ".join(map(str, texts))
         else:
             columns[name] = value
     return columns

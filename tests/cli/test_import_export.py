@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from rig.reasons import plain_reason
+from rig.reasons import make_reason, plain_reason
 from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.cli.lab import drops_of
@@ -89,13 +89,19 @@ def test_all_files(fences, call, tmp_path):
     with Session.open(copy) as session:
         session.add_drop(replace(session.drop(2, 1), attempt=2, certificate=None))
         void = [plain_reason("lost edges"), plain_reason('say "no", twice')]
+        session.add_state(1, 1, RunState.REJECTED, 9, [make_reason("record_damaged", text="")])
         session.add_state(2, 2, RunState.VOID, 10, void)
         states, pings = session.states(), session.pings()
     place = tmp_path / "deep" / "out"
     for _ in range(2):  # the second time replaces
         call("export", copy, "--csv", place)
-    runs = [(row["run"], row["attempt"], row["superseded"]) for row in read_csv(place / "runs.csv")]
+    rows = read_csv(place / "runs.csv")
+    runs = [(row["run"], row["attempt"], row["superseded"]) for row in rows]
     assert runs[:3] == [("1", "1", "0"), ("2", "1", "1"), ("2", "2", "0")]
+    printed = [run["reason_codes"] for run in call("analyze", copy, "--json").json["runs"]]
+    codes = ["; ".join(reason["code"] for reason in reasons) for reasons in printed]
+    assert [row["reason_codes"] for row in rows if row["superseded"] == "0"] == codes
+    assert any(codes)
     said = read_csv(place / "states.csv")
     assert [row["state"] for row in said] == [entry.state for entry in states]
     assert said[-1]["reasons"] == 'lost edges; say "no", twice'
