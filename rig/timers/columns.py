@@ -11,14 +11,23 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import cache
 from typing import NamedTuple
 
 from rig.text_rows import read_rows
 from rig.timers import vocabulary
 from rig.timers.table import Row, RowBlock
 from rig.timers.timer_file import TimerFile
-from rig.timers.vocabulary import POWERS, find_label, form, holds, is_measured, is_number, unit_of
+from rig.timers.vocabulary import (
+    POWERS,
+    find_label,
+    form,
+    holds,
+    is_measured,
+    is_number,
+    kinds_of,
+    unit_of,
+)
 
 SAMPLED = ("level", "volts")
 """Roles of samples: what an input was at a time, whether it changed then or not."""
@@ -123,33 +132,30 @@ def columns_of(
     facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
     counts = Counter(itertools.chain(*facts.values()))
     heading = block.find_heading(width, facts)
-    numbers = [n for n, text in enumerate(rows[0].texts) if is_measured(text)]
     for row in block.headings:
-        # What has most of a row's numbers is no heading, but a row of which nothing can be read.
-        count = sum(is_measured(row.cell(n)) for n in numbers)
-        count += bool(vocabulary.kinds_of(row.cell(0)))
-        is_below = row.line > (heading.line if heading else 0)
-        is_setting = any(row.cell(n) for n in range(min(numbers, default=0)) if n not in facts)
-        if is_below and not is_setting and 2 * count > len(numbers) > 0:
+        # What has half of a row's numbers is no heading, but a row of which nothing can be read.
+        count = sum(is_measured(row.cell(n)) for n in facts)
+        if row.line > heading.line and kinds_of(row.cell(0)) and 2 * count >= len(facts):
             file.unread.append(row.line)
             file.rows += 1
     is_counted = facts.keys() >= {0, width - 1} and "counts" in facts[0]
-    if heading and is_counted and len(heading.texts) < width:
+    if is_counted and 0 < len(heading.texts) < width:
         heading = heading._replace(texts=["", *heading.texts])  # numbers of rows have no name
-    file.facts |= {*["beam"] * bool(counts["any.beam"])}
-    shared = {f"table.{fact}" for fact in counts} | _held({"rated": block.find_time_base()[1]})
+    file.facts |= {"beam"} if "any.beam" in counts else set()
+    shared = {f"table.{fact}" for fact in counts}
     shared |= {f"columns.{min(len(facts), _MANY)}", f"states.{min(counts['all.state'], _MANY)}"}
+    shared |= facts_held({"rated": block.find_time_base()[1]})
     columns = [_read_column(block, heading, n, facts[n] | shared, cells[n]) for n in facts]
     for column in columns:
         column.filled = len(cells[column.at]) / len(rows)
-    if heading is None:
+    if not heading.texts:
         if any(row.count_known() > 1 and len(row.texts) > width for row in block.headings):
             file.problems.refuse(block.headings[0].line, "heading_unfit", columns=width)
         inputs = [column for column in columns if column.role in SAMPLED]
         for column, name in zip(inputs, block.find_inputs(len(inputs)), strict=False):
             column.gate = column.name = name
     _settle_roles(file, columns)
-    above = heading or rows[0]
+    above = heading if heading.texts else rows[0]
     for column in columns:
         if column.role == "setting":
             accepted = roles()["setting"][1]
@@ -164,9 +170,11 @@ def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
     Of roles that are possible each is taken once; falls decide which way is that of the file.
     """
     there = {column.role for column in columns}
-    # Levels beside states are the same without a name; beside volts, volts that are 0 at first.
-    level = next((role for role in ("volts", "state") if role in there), "level")
-    meant = {"elapsed": "duration" if "time" in there else "time", "level": level}
+    meant = {
+        "elapsed": "duration" if "time" in there else "time",
+        # Beside states the same without a name; beside volts, volts that are 0 at first.
+        "level": next((role for role in ("volts", "state") if role in there), "level"),
+    }
     unclear = [column for column in columns if "|" in column.role]
     readings = [column.role.split("|") for column in unclear]
     ways = [
@@ -174,8 +182,9 @@ def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
         for way in itertools.product(*readings if len(unclear) <= _MOST_OPEN else [[]])
         if all(role == "other" or (role not in there and way.count(role) == 1) for role in way)
     ] or [("setting",) * len(unclear)]
-    file.ways = max(file.ways, len(ways))
-    for column, role in zip(unclear, ways[file.way % len(ways)], strict=True):
+    file.ways = max(file.ways, file.separators * len(ways))
+    way = ways[file.way // file.separators % len(ways)]
+    for column, role in zip(unclear, way, strict=True):
         column.role = role
     for column in columns:
         column.role = meant.get(column.role, column.role)
@@ -183,19 +192,20 @@ def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
 
 
 def _read_column(
-    block: RowBlock, heading: Row | None, n: int, facts: set[str], cells: Sequence[str]
+    block: RowBlock, heading: Row, n: int, facts: set[str], cells: Sequence[str]
 ) -> TimerColumn:
     """Find out what a column is; the row below its heading, or its cells, may say the unit."""
-    name = heading.cell(n) if heading else ""
+    name = heading.cell(n)
     above = [name, *(row.cell_over(n) for row in block.headings if row is not heading)]
     run, gate = (next(filter(None, [find_label(x, y) for x in above]), "") for y in ("run", "gate"))
     column = TimerColumn(n, name or f"column {n + 1}", run=run)
     prefix, _, rest = name.partition(":")
-    if rest.strip() and not find_label(prefix, "gate"):
+    is_prefix = sum(x.startswith(f"{prefix}:") for x in heading.texts) > 1
+    if rest.strip() and is_prefix and not find_label(prefix, "gate"):
         column.run, name = column.run or prefix.strip(), rest
     bare = vocabulary.without_accents(name).replace(column.run, "")
     # Units stand in the heading, or in the row above the data.
-    last = [row.cell(n) for row in block.headings[-1:] if heading and row.line > heading.line]
+    last = [row.cell(n) for row in block.headings[-1:] if name and row.line > heading.line]
     units = [*map(unit_of, [bare, *last, *cells[: "all.timed" in facts]])]
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
     unit = "" if find_label(unit, "gate") else unit
@@ -213,11 +223,11 @@ def _read_column(
         "numbered": column.run,
     }
     kind = "timed" if unit in POWERS else {"v": "volt", "": "unitless"}.get(unit, "strange")
-    facts |= roles_of_name | _held(named) | {kind}
+    facts |= roles_of_name | facts_held(named) | {kind}
     column.role = next(
         role for role, rule in read_rows(__file__, "columns.txt", ":") if holds(rule, facts)
     )
-    if column.role in {"time", "elapsed"}:
+    if column.role in {"time", "elapsed", "time|setting"}:
         column.power = POWERS.get(unit, 0 if "all.stamp" in facts else None)
         column.state = next((state for state in ("clear", "blocked") if state in facts), "")
     if column.role == "edge" and {"pair", "all.state"} & facts == {"pair"}:
@@ -227,15 +237,16 @@ def _read_column(
 
 def _facts_of_values(texts: Sequence[str]) -> set[str]:
     """Return what holds of the values of a column, of which some may be missing."""
-    known = [*filter(vocabulary.kinds_of, texts)]
+    known = [*filter(kinds_of, texts)]
     texts = known if 2 * len(known) > len(texts) else texts  # a broken cell makes no other kind
-    kinds, distinct = list(map(vocabulary.kinds_of, texts)), {*texts}
+    kinds, distinct = list(map(kinds_of, texts)), {*texts}
     facts = {f"all.{kind}" for kind in frozenset.intersection(*kinds)}
     facts |= {f"any.{kind}" for kind in frozenset().union(*kinds)}
-    numbers = [float(text) for text in texts if is_number(text)]
+    numbers = [*map(float, filter(is_number, texts))]
     steps = {b - a for a, b in itertools.pairwise(numbers)} if "all.number" in facts else {-1.0}
+    steps -= {step for step in steps if step < -5e8}  # a counter begins anew
     is_rising = min(steps, default=0.0) >= 0.0 and steps != {0.0}
-    return facts | _held(
+    return facts | facts_held(
         {
             "rises": is_rising,
             "climbs": is_rising and "any.fraction" in facts,
@@ -250,7 +261,8 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
     )
 
 
-def _held(facts: Mapping[str, object]) -> set[str]:
+def facts_held(facts: Mapping[str, object]) -> set[str]:
+    """Return what is true."""
     return {fact for fact, is_true in facts.items() if is_true}
 
 
@@ -263,7 +275,20 @@ def pair_columns(columns: Sequence[TimerColumn]) -> Iterator[Signal]:
     times = [c for c in times if c.power == finest[_part_of(c)]] or counts
     chosen = next((v for v in VALUES if any(c.role in v for c in columns)), ())
     is_sampled = chosen == SAMPLED
-    clocks = {c: min(times, key=partial(_distance, c)) for c in columns if c.role in chosen}
+    # To a value belong times of its run and gate, and of those the nearest, if possible left of it.
+    clocks = {
+        c: min(
+            times,
+            key=lambda t: (
+                bool(c.run) and t.run not in {c.run, ""},
+                not t.gate or t.gate != c.gate,
+                t.at > c.at,
+                abs(t.at - c.at),
+            ),
+        )
+        for c in columns
+        if c.role in chosen
+    }
     for clock in times:
         values = [column for column in clocks if clocks[column] is clock]
         # Without values it shares those of another run, or tells of changes by itself.
@@ -272,8 +297,7 @@ def pair_columns(columns: Sequence[TimerColumn]) -> Iterator[Signal]:
             values = shared or [replace(clock, at=ROW_COUNT.at, role="moment")]
         labels = Counter(map(_label_of, values))
         for n, value in enumerate(values, 1):
-            is_beside = is_sampled or len(values) > 1
-            label = _label_of(value) if is_beside else clock.gate or value.gate
+            label = _label_of(value) if is_sampled or values[1:] else clock.gate or value.gate
             label += f" ({n})" if is_sampled and labels[label] > 1 else ""
             yield Signal(clock, value, label)
 
@@ -282,14 +306,7 @@ def _part_of(clock: TimerColumn) -> tuple[str, str, str]:
     return clock.gate, clock.run, clock.state
 
 
-def _distance(value: TimerColumn, clock: TimerColumn) -> tuple[bool, bool, bool, int]:
-    """Return how far times are from a value: in run and gate, else by columns, nearest if left."""
-    is_other_run = bool(value.run) and clock.run not in {value.run, ""}
-    is_other_gate = not clock.gate or clock.gate != value.gate
-    return is_other_run, is_other_gate, clock.at > value.at, abs(clock.at - value.at)
-
-
 def _label_of(value: TimerColumn) -> str:
     """Return what the file calls an input: the heading of samples, or the gate's name in it."""
-    is_named = value.role in SAMPLED and value.gate in value.name
+    is_named = value.role in SAMPLED and value.gate in value.name and not value.run
     return value.name if is_named or not value.gate else value.gate

@@ -34,9 +34,11 @@ def find_crossings(samples: Array) -> tuple[float | None, Array]:
         Of each the line of the sample behind it, its moment, and 1 where volts rise.
     """
     lines, times, volts = samples.T
-    if not volts.size:
+    measured = volts[np.isfinite(volts)]
+    if not measured.size:
         return None, samples[:0]
-    low, high = volts.min(), volts.max()
+    low, high = measured.min(), measured.max()
+    volts = volts.clip(low, high)
     for _ in range(10):  # two means, one for each level: of two levels, two or three are enough
         above = volts > 0.5 * (low + high)
         if above.all() or not above.any():

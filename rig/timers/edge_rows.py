@@ -17,7 +17,7 @@ from rig.timers.vocabulary import LONGEST, is_remark
 
 HEADER = ("run", "channel", "time_s", "state")
 """Of the project's own format, in which every line is a row."""
-_CELLS: tuple[tuple[str, Callable[[str], Any], str], ...] = (
+_CELLS: tuple[tuple[str, Any, str], ...] = (
     (r"[+]?0*[1-9][0-9]{0,8}", int, "a run: a whole number from 1"),
     (r"(?!1[6-9])1?[0-9]", int, "a channel: 0 to 15"),
     (r"[^:]+", moment, "a time of a drop in seconds"),
@@ -47,8 +47,7 @@ def read_edges(path: str | Path) -> list[Drop]:
         if line.strip() and not is_remark(line)
     )
     next(rows, None)  # the header
-    runs: dict[int, list[tuple[int, int, bool]]] = {}
-    last: dict[tuple[int, int], int] = {}
+    runs, last = dict[int, list[Any]](), dict[Any, int]()
     for row in rows:
         if len(row.texts) != len(HEADER):
             problems.add(row.line, 1, "", "wrong_width", values=len(row.texts))
@@ -64,13 +63,13 @@ def read_edges(path: str | Path) -> list[Drop]:
         edges = runs.setdefault(run, [])
         first = edges[0][0] if edges else tick
         begin, end = last.get((run, channel), first - LONGEST_DROP), first + LONGEST_DROP
-        if not begin <= tick <= end:
+        if begin <= tick <= end:
+            last[run, channel] = tick
+            edges.append((tick, channel, bool(state)))
+        else:
             since, until = (seconds(bound, Fraction(TICK_HZ)) for bound in (begin, end))
             accepted = f"a time from {since} s (the last of channel {channel}) to {until} s"
             problems.reject(*row.place(2), HEADER[2], row.texts[2], accepted)
-            continue
-        last[run, channel] = tick
-        edges.append((tick, channel, bool(state)))
     problems.raise_if_any()
     if not any(runs.values()):
         problems.refuse(1, "no_edges")

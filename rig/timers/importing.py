@@ -7,19 +7,18 @@ decides is asked, and rows of which no edge is made are refused.
 from __future__ import annotations
 
 import itertools
+import re
 from argparse import Namespace
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from rig.errors import InputError
 from rig.reasons import Reason, make_reason
 from rig.records import Drop
 from rig.timers.edge_rows import HEADER, is_own, read_edges
-from rig.timers.layouts import SETTINGS, FileReading, find_layouts, input_names, is_accepted
+from rig.timers.layouts import SETTINGS, FileReading, find_layouts, input_names
 from rig.timers.lines import read_lines
 from rig.timers.moments import LONGEST_DROP, TICK_HZ
 from rig.timers.problems import refusal
@@ -57,7 +56,7 @@ class FallMatch(NamedTuple):
         What falls of the protocol do not do.
     """
 
-    share: float
+    share: float = 0.0
     worst: int = 0
     evidence: float = 0.0
     text: str = ""
@@ -111,21 +110,20 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
             if getattr(options, name) is not None:
                 raise refusal(f"--{name.replace('_', '-')}", "own_format_stated")
         return Import(read_edges(place), {}, [f"the project's own format: {','.join(HEADER)}"], [])
-    readings = _find_readings(options, gates, bars)
-    reading, match = readings[0], FallMatch(0.0)
+    reading, *others = _find_readings(options, gates, bars)
+    match, fitting = FallMatch(), list[Reason]()
     if not options.as_read:
-        reading, match = _choose(readings, place, fit)
+        reading, match = _choose([reading, *others], place, fit)
         _refuse_impossible(reading, place)
-    notes = [*reading.file.notes, _account(reading, options)]
-    if not options.as_read:
-        notes.append(make_reason("reading_chosen", option=str(reading.layout), fit=match.text))
-    notes += [*match.doubts, *_assumptions(reading, gates)]
-    if options.map_file is not None and not Path(options.map_file).exists():
+        fitting = [make_reason("reading_chosen", option=str(reading.layout), fit=match.text)]
+    file, channels = reading.file, reading.layout.channels
+    notes = [*file.notes, _account(reading, options), *fitting, *match.doubts]
+    if options.map_file and not Path(options.map_file).exists():
         Path(options.map_file).write_text(f"{reading.layout.text}\n", "utf-8")
-    channels = reading.layout.channels
     pairs = [f"input {x} is the gate at channel {n}" for x, n in channels.items() if x]
-    lines = [*reading.file.lines, *pairs, str(reading.layout), *filter(None, [match.text])]
-    return Import([*map(reading.drop, reading.runs)], channels, lines, notes)
+    lines = [*file.lines, *pairs, str(reading.layout), *filter(None, [match.text])]
+    drops = [*map(reading.drop, reading.runs)]
+    return Import(drops, channels, lines, [*notes, *_assumptions(reading, gates)])
 
 
 def _find_readings(options: Namespace, gates: Sequence[int], bars: int) -> list[FileReading]:
@@ -149,13 +147,12 @@ def _find_readings(options: Namespace, gates: Sequence[int], bars: int) -> list[
         pairs = ",".join(f"{name}={n}" for name, n in zip(labels, gates, strict=False))
         values = {"inputs": ", ".join(labels), "channels": ", ".join(map(str, gates))}
         raise refusal(options.events, "inputs_unclear", **values, pairs=pairs)
-    lasting = {reading: max(reading.lasting.values()) for reading in readings}
-    shortest = min(readings, key=lasting.__getitem__)
-    if lasting[shortest] > LONGEST_DROP:
-        place = f"{options.events}:{shortest.edges.line[shortest.edges.tick.argmax()]}:1"
-        limit = {"lasting_s": lasting[shortest] / TICK_HZ, "limit_s": LONGEST_DROP / TICK_HZ}
-        raise refusal(place, "too_long", **limit)
-    return [reading for reading in readings if lasting[reading] <= LONGEST_DROP]
+    shortest = min(readings, key=lambda reading: reading.longest)
+    if shortest.longest > LONGEST_DROP:
+        line = shortest.edges.line[shortest.edges.tick.argmax()]
+        limit = {"lasting_s": shortest.longest / TICK_HZ, "limit_s": LONGEST_DROP / TICK_HZ}
+        shortest.file.problems.refuse(line, "too_long", **limit)
+    return [reading for reading in readings if reading.longest <= LONGEST_DROP]
 
 
 def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[FileReading, FallMatch]:
@@ -165,27 +162,30 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
     whatever falls say. Of others a drop has to be identified, which is the evidence. What
     contradicts the file is taken only where nothing else fits nearly as well.
     """
-    distinct = [*{x.key: x for x in reversed(readings)}.values()][::-1]
+    edges = {
+        str(x.edges[["run", "tick", "channel", "blocked"]].tolist()): x for x in reversed(readings)
+    }
+    distinct = [*edges.values()][::-1]
     usual = [reading for reading in distinct if reading.is_whole] or distinct
     if len(usual) == 1 and "channels" in usual[0].file.stated:
         return usual[0], fit(usual[0], True)
     matches = {x: fit(x, False) for x in distinct}
     rough = sorted(distinct, key=lambda x: -matches[x].share)
     likely = [x for x in rough if matches[x].share >= x.least_share]
-    finalists = likely[:_FINALISTS]
-    matches |= {x: fit(x, True) for x in finalists}
-    ranked = [x for x in finalists if matches[x].evidence and matches[x].share >= x.least_share]
+    matches |= {x: fit(x, True) for x in likely[:_FINALISTS]}
+    ranked = [x for x in likely if matches[x].evidence and matches[x].share >= x.least_share]
     ranked.sort(key=lambda x: _DECISIVE * x.oddities - matches[x].evidence)
     if not ranked:
-        best = (finalists or rough)[0]
+        best = [*likely, *rough][0]
         is_open = [x for x in rough if x.layout.dark not in {"states", "inverted"}]
         proposed = list(dict.fromkeys(str(x.layout) for x in [*likely, *is_open]))[:3]
         run, options = matches[best].worst or min(best.runs), "; ".join([*proposed, "--as-read"])
         values = {"share": 100 * matches[best].share, "run": run, "options": options}
-        raise refusal(f"{place}:{best.runs[run].line.min()}:1", "no_reading_fits", **values)
-    best, rival = ranked[0], next((x for x in ranked[1:] if x.oddities == ranked[0].oddities), None)
-    if rival and matches[best].evidence - matches[rival].evidence < _DECISIVE:
-        raise refusal(place, "several_readings", options=f"{best.layout} or {rival.layout}")
+        best.file.problems.refuse(best.runs[run].line.min(), "no_reading_fits", **values)
+    best = ranked[0]
+    rivals = [x for x in ranked if x.oddities == best.oddities][1:2]
+    if any(matches[best].evidence - matches[x].evidence < _DECISIVE for x in rivals):
+        raise refusal(place, "several_readings", options=f"{best.layout} or {rivals[0].layout}")
     return best, matches[best]
 
 
@@ -206,16 +206,15 @@ def _refuse_impossible(reading: FileReading, place: str) -> None:
         moments: set[object] = {drop.edges} if is_coarse else {*drop.edges}
         if layout.pause_s and lines in earlier:  # a column of another clock
             moments = {lines}
-        same = Counter(earlier[moment] for moment in moments & earlier.keys())
+        same = Counter(earlier[moment] for moment in moments & earlier.keys()).most_common(1)
+        if same and same[0][1] >= min(len(moments), max(_FEWEST_SAME, 1 + len(moments) // 2)):
+            raise refusal(place, "same_twice", run=run, other=same[0][0])
         earlier |= dict.fromkeys((lines, *moments), run)
-        for other, count in same.most_common(1):
-            if count >= min(len(moments), max(_FEWEST_SAME, 1 + len(moments) // 2)):
-                raise refusal(place, "same_twice", run=run, other=other)
     # Of changes alone, two in a row mean that the row of the first is missing.
-    line, tick = reading.edges.line, reading.edges.tick
-    again = line[1:][(np.diff(line) == 0) & (np.diff(tick) == 0)]
-    if again.size and file.period is None:  # regular samples see changes together
-        raise refusal(place, "at_once", lines=_some(again.tolist()))
+    cells = Counter(reading.edges[["line", "tick", "clock"]].tolist())
+    again = [line for (line, *_), count in cells.items() if count > 1]
+    if again and file.period is None:  # regular samples see changes together
+        raise refusal(place, "at_once", lines=_some(again))
 
 
 def _account(reading: FileReading, options: Namespace) -> Reason:
@@ -223,7 +222,7 @@ def _account(reading: FileReading, options: Namespace) -> Reason:
     file, edges = reading.file, Counter(reading.edges.line.tolist())
     # A level that changes may be of an input that is no gate.
     is_change = ~file.changes.first & ("sampled" not in file.facts)
-    left = Counter(file.changes.line[is_change].tolist()) - edges
+    left = Counter(file.changes.line[is_change].tolist()) - edges - Counter(reading.states)
     unused = sorted({*file.unread, *left})
     counts = {"runs": len(reading.runs), "rows": file.rows, "edges": edges.total()}
     if not unused:
@@ -240,16 +239,16 @@ def _some(lines: Sequence[int]) -> str:
 
 def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]:
     """Yield what is taken to be so, and what the file lacks."""
-    file, layout, channels = reading.file, reading.layout, reading.layout.channels
-    if reading.renamed and file.changes.run.any():
-        runs = ", ".join(f"{name} is run {n}" for name, n in reading.renamed.items())
-        yield make_reason("runs_renamed", runs=runs)
+    file, layout = reading.file, reading.layout
+    renamed = ", ".join(f"{name} is run {n}" for name, n in reading.renamed.items())
+    if renamed and file.changes.run.any():
+        yield make_reason("runs_renamed", runs=renamed)
     if layout.pause_s:
         yield make_reason("several_drops", drops=len(reading.runs), pause_s=layout.pause_s)
     if file.period:
         period_us = file.period / 10 ** POWERS[layout.unit or "s"] / 1e6
         yield make_reason("samples", period_us=period_us, u_us=period_us / 12.0**0.5)
-    if absent := [str(n) for n in gates if n not in channels.values()]:
+    if absent := [str(n) for n in gates if n not in layout.channels.values()]:
         yield make_reason("gates_absent", channels=", ".join(absent))
     if opposite := {"high": "low", "low": "high"}.get(layout.dark):
         yield make_reason("blocked_level", level=layout.dark, other=opposite)
@@ -258,9 +257,9 @@ def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]
     if reading.firsts:
         code = "first_row" if layout.first == "change" else "first_unknown"
         yield make_reason(code, input=", ".join(reading.firsts))
-    idle = [label for label in file.labels if label not in channels]
+    idle = ", ".join(label for label in file.labels if label not in layout.channels)
     if idle and layout.groups != "passing":
-        yield make_reason("inputs_unused", inputs=", ".join(idle))
+        yield make_reason("inputs_unused", inputs=idle)
 
 
 def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> dict[str, Any]:
@@ -273,11 +272,8 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
         raise refusal("--channel", "inputs_several", inputs=", ".join(labels))
     begins = {"dark": "dark=", "unit": "unit=", "channel": f"{labels[0] or 'input'}=", "map": ""}
     texts = {options.map_file: next(read_lines(saved), "")} if saved.is_file() else {}
-    texts |= {
-        f"--{name}": f"{begin}{value}"
-        for name, begin in begins.items()
-        if (value := getattr(options, name)) is not None
-    }
+    given = [(f"--{x}", begin, getattr(options, x)) for x, begin in begins.items()]
+    texts |= {place: f"{begin}{value}" for place, begin, value in given if value is not None}
     pairs = form("assigned").findall
     rows = [(x, *y) for x, text in texts.items() for y in pairs(text) or [(text, "")]]
     settings = {*SETTINGS}.difference(labels)
@@ -292,7 +288,7 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
             channels[inputs[name]] = int(value)
         elif name not in settings:
             raise refusal(place, "input_unknown", text=name, inputs=", ".join(inputs))
-        elif not is_accepted(name, value):
+        elif not re.fullmatch(SETTINGS[name], value):
             raise refusal(place, "layout_unclear", text=f"{name}={value:.40}")
         elif name == "unit" and {None, POWERS[value]}.isdisjoint(file.powers):
             units = " and ".join(sorted(SYMBOLS[power] for power in file.powers)) or "s"

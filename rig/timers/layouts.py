@@ -7,7 +7,6 @@ gates, and which gate each input is. What each setting may be, and when, is in `
 from __future__ import annotations
 
 import itertools
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
@@ -18,9 +17,10 @@ import numpy as np
 from rig.arrays import Flags, Index
 from rig.records import Drop
 from rig.text_rows import read_rows
+from rig.timers.columns import facts_held
 from rig.timers.edge_rows import make_drop
 from rig.timers.moments import TICK_HZ
-from rig.timers.timer_file import STATES, Records, TimerFile, record_type
+from rig.timers.timer_file import STATES, Records, TimerFile
 from rig.timers.vocabulary import POWERS, holds, number_of
 
 _LONGEST = 60 * TICK_HZ
@@ -33,7 +33,6 @@ _GOOD_GUESS = 0.95
 _MOST_MAPS = 200
 _FEWEST = 3
 """Changes of a drop that tell which gate it passed: two are near those of falls past several."""
-_EDGE = record_type("run:i8 tick:O channel:i8 blocked:? line:i4")
 
 
 class FileLayout(NamedTuple):
@@ -78,7 +77,10 @@ class FileLayout(NamedTuple):
         return f"--map '{self.text}'"
 
 
-SETTINGS = FileLayout._fields[:-1]
+SETTINGS = {
+    name: "|".join(row[1] for row in read_rows(__file__) if row[0] == name)
+    for name in FileLayout._fields[:-1]
+}
 """What a layout has beside its inputs; `layouts.txt` says what each may be."""
 
 
@@ -90,10 +92,12 @@ class FileReading:
     edges
         All of them, by runs: of each its run, its time, ps, its gate, the state after it, and the
         line that it comes from.
-    runs, lasting
-        Those of each run, by its number, and how long they last, ps.
+    runs, lasting, longest
+        Those of each run, by its number, and how long they last, ps; the longest of them.
     firsts
         Inputs whose first row is a beam that is blocked, at the beginning or by a change.
+    states
+        Lines that only say that beams are clear: what passed no beam is no drop.
     renamed
         Runs that the file calls otherwise: its name, and the number here.
     """
@@ -120,34 +124,38 @@ class FileReading:
         is_dark_first = changes.first & blocked & is_gate & ~is_late
         self.firsts = [names[n] for n in np.unique(changes.label[is_dark_first])]
         is_edge = is_gate & (~changes.first | (blocked & (is_late | (layout.first == "change"))))
-        columns = [drop, changes.tick, channel, blocked, changes.line]
-        edges = np.rec.fromarrays(columns, _EDGE)[is_edge]
+        # Before a drop, a file may say that its beams are clear.
+        is_said = drop < next(iter(drop[is_edge & blocked]), 0)
+        is_edge &= ~is_said
+        self.states = changes.line[is_said].tolist()
+        edges = np.rec.fromarrays(
+            [drop, changes.tick, channel, blocked, changes.line, changes.clock],
+            formats="i8,O,i8,?,i4,i4",
+            names="run,tick,channel,blocked,line,clock",
+        )[is_edge]
         _, begin, places = np.unique(edges.run, return_index=True, return_inverse=True)
         called = [names[n] for n in changes.run[is_edge][begin]]
         numbers = _number_runs([*map(number_of, called)])
         rows = zip(called, numbers, strict=True)
         self.renamed = {x or "one without a name": n for x, n in rows if number_of(x) != n}
         edges.run = np.array(numbers, int)[places]
-        self.edges: Records = edges[np.argsort(edges.run, kind="stable")]
+        self.edges = edges[edges.run.argsort(kind="stable")]
         numbers.sort()
         parts = np.split(self.edges, np.searchsorted(self.edges.run, numbers)[1:])
         self.runs: dict[int, Records] = dict(zip(numbers, parts, strict=False))
-        self.lasting = {run: part.tick[-1] - part.tick[0] for run, part in self.runs.items()}
+        self.lasting = {n: part.tick[-1] - part.tick[0] for n, part in self.runs.items()}
+        self.longest = max(self.lasting.values(), default=0)
 
     def drop(self, run: int) -> Drop:
         """Return the drop of a run."""
         return make_drop(run, self.runs[run][["tick", "channel", "blocked"]].tolist())
 
     @property
-    def key(self) -> int:
-        """What is the same for readings of the same edges."""
-        return hash((*self.edges[["run", "tick", "channel", "blocked"]].tolist(),))
-
-    @property
     def least_share(self) -> float:
         """Share of the edges near a fall's, of all that came or were due, that is credible."""
-        is_guess = "guess" in self.file.facts or self.layout.groups in {"passing", "unsorted"}
-        is_broken = self.layout.dark.startswith("turns") and not self.is_whole
+        facts = {*self.file.facts, self.layout.dark, self.layout.groups}
+        is_guess = facts & {"guess", "inverted", "passing", "unsorted"}
+        is_broken = "turns" in self.layout.dark and not self.is_whole
         return _GOOD_GUESS if is_guess or is_broken else _GOOD
 
     @property
@@ -226,11 +234,6 @@ def input_names(file: TimerFile, groups: str | None, gates: Sequence[int]) -> li
     return passing if groups == "passing" else [*file.labels] or [""]
 
 
-def is_accepted(name: str, value: str) -> bool:
-    """Whether a setting may have a value."""
-    return any(name == x and re.fullmatch(form, value) for x, form, *_ in read_rows(__file__))
-
-
 def find_layouts(file: TimerFile, gates: Sequence[int], bars: int) -> Iterator[FileLayout]:
     """Yield every way in which a file may be read, that which is most usual first.
 
@@ -242,10 +245,15 @@ def find_layouts(file: TimerFile, gates: Sequence[int], bars: int) -> Iterator[F
     stated, state = file.stated, file.changes.state
     changes, drop = group_changes(file, "", "runs", 0.0)
     most = int(1 + count_before(drop * len(file.names) + changes.label).max(initial=0))
-    is_signal, is_wire = np.any(state > STATES.index("blocked")), len(file.labels) < 2
-    facts = {"signal" if is_signal else "states" if np.any(state) else "times", *file.facts}
-    facts |= {*["many"] * (most > bars), *["wire"] * (is_wire and bars == 1 < len(gates))}
-    facts |= {*["open"] * (None in file.powers), *["first"] * bool(np.any(file.changes.first))}
+    is_signal = np.any(state > STATES.index("blocked"))
+    held = {
+        "signal" if is_signal else "states" if np.any(state) else "times": True,
+        "many": most > bars,
+        "wire": len(file.labels) < 2 and bars == 1 < len(gates),
+        "open": None in file.powers,
+        "first": np.any(file.changes.first),
+    }
+    facts = file.facts | facts_held(held)
     choices = dict[str, list[Any]]()
     for name, value, rule, *_ in read_rows(__file__):
         if holds(rule, facts):
@@ -253,11 +261,11 @@ def find_layouts(file: TimerFile, gates: Sequence[int], bars: int) -> Iterator[F
     choices |= {name: [value] for name, value in stated.items() if name in choices}
     for values in itertools.product(*choices.values()):
         layout = FileLayout(**dict(zip(choices, values, strict=True)))
-        maps = [stated["channels"]] if "channels" in stated else _channels(file, gates, layout)
         pauses = _pauses(file, layout.unit, layout.groups)
-        pauses = [float(stated["pause_s"])] if "pause_s" in stated else pauses
-        for channels, pause in itertools.product(maps, pauses):
-            yield layout._replace(channels=channels, pause_s=pause)
+        for pause in [float(stated["pause_s"])] if "pause_s" in stated else pauses:
+            paused = layout._replace(pause_s=pause)
+            maps = [stated["channels"]] if "channels" in stated else _channels(file, gates, paused)
+            yield from (paused._replace(channels=channels) for channels in maps)
 
 
 @lru_cache(4)
@@ -286,8 +294,9 @@ def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list
         return [dict(zip(labels, gates, strict=True))]
     by_number = {x: n for x in labels if (n := number_of(x)) is not None and n in gates}
     if len({*by_number.values()}) == len(labels):
-        return [by_number]
-    _, drop = group_changes(file, layout.unit, layout.groups, 0.0)
+        from_1 = {x: n - 1 for x, n in by_number.items() if n - 1 in gates}
+        return [by_number, *[from_1] * (len(from_1) == len(labels))]
+    _, drop = group_changes(file, layout.unit, layout.groups, layout.pause_s)
     if labels == [""] and len(gates) > 1 and np.all(np.bincount(drop) < _FEWEST):
         return []
     later = file.changes[~file.changes.first][::-1]
@@ -298,4 +307,4 @@ def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list
         for beams in itertools.islice(itertools.combinations(gates, len(labels)), _MOST_MAPS)
         for names, channels in ((labels, sorted(beams)), (passed, beams))
     ]
-    return maps or [by_number] * bool(by_number)
+    return maps or [by_number] * (0 < len(by_number) == len({*by_number.values()}))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from decimal import ROUND_HALF_EVEN, Context
+from decimal import ROUND_HALF_EVEN, Context, Decimal
 from fractions import Fraction
 
 from rig.timers.vocabulary import POWERS, form, is_number, unit_of
@@ -10,13 +10,10 @@ from rig.timers.vocabulary import POWERS, form, is_number, unit_of
 TICK_HZ = 10**12
 LONGEST_PS = 10**33
 """A time of day in nanoseconds since 1970, if it is taken for seconds, is shorter."""
-OVERFLOWS_PS: dict[int | None, tuple[int, ...]] = {
-    0: (12 * 3600 * TICK_HZ,),
-    3: (2**30 * 10**9, 2**32 * 10**9),
-    6: (2**30 * 10**6, 2**32 * 10**6),
-}
-"""After which counters of a unit (its power from seconds) begin anew: a clock, and those of ms and
-µs of MicroPython and of an Arduino."""
+OVERFLOWS = (2**30, 2**32)
+"""Counts after which counters begin anew, of MicroPython and of an Arduino."""
+HALF_DAY = 12 * 3600 * TICK_HZ
+"""After which a clock does."""
 LONGEST_DROP = 3600 * TICK_HZ
 """Picoseconds: a drop that takes longer has a wrong unit, or is several runs."""
 _EXACT = Context(prec=100, rounding=ROUND_HALF_EVEN)
@@ -52,7 +49,7 @@ def picoseconds(text: str, power: int = 0) -> int | None:
     """Read a decimal number of 10^power s as picoseconds, ties to even; `None` for another text."""
     if not is_number(text):
         return None
-    number = _EXACT.scaleb(_EXACT.create_decimal(text), 12 + power)
+    number = _EXACT.scaleb(Decimal(text), 12 + power)
     return int(_EXACT.to_integral_value(number)) if abs(number) < LONGEST_PS else None
 
 

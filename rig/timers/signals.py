@@ -18,24 +18,24 @@ from typing import Any
 import numpy as np
 
 from rig.reasons import make_reason
-from rig.timers.columns import SAMPLED, TimerColumn, columns_of, pair_columns, roles
+from rig.timers.columns import SAMPLED, TimerColumn, columns_of, facts_held, pair_columns, roles
 from rig.timers.crossings import find_crossings
 from rig.timers.lines import is_cut, read_lines
-from rig.timers.moments import OVERFLOWS_PS, TICK_HZ, moment
+from rig.timers.moments import HALF_DAY, OVERFLOWS, TICK_HZ, moment
 from rig.timers.table import Row, RowBlock, Table
 from rig.timers.timer_file import CHANGE, STATES, Records, TimerFile
 from rig.timers.vcd import BEGINNINGS, vcd_rows
-from rig.timers.vocabulary import is_number, state_of
+from rig.timers.vocabulary import form, is_number, state_of
 
 MAX_EVENTS = 500_000
 """Those of 600 drops of 25 rods past 16 gates; what has more is no record of drops."""
 _SAMPLE = 200
 """Rows that show what columns are."""
 _MARKS = {"\t": "tabs", ";": "semicolons", "|": "bars", ",": "commas", " ": "blanks", "": "words"}
+_BEYOND = {"above": np.inf, "below": -np.inf}
+"""Volts that are out of an instrument's range."""
 _SPARSE = 0.5
 """Share of cells with a text below which the others belong to the one above."""
-_TURN = 600 * TICK_HZ
-"""Picoseconds from a time to the next within which a counter is taken to have begun anew."""
 
 
 def read_file(file: TimerFile) -> TimerFile:
@@ -49,20 +49,32 @@ def read_file(file: TimerFile) -> TimerFile:
     readers, changes = dict[object, SignalReader](), [np.empty(0, CHANGE)]
     with closing(read_lines(file.path)) as lines:
         head = list(itertools.islice(lines, 50))
-        numbered = enumerate(itertools.chain(head, lines), 1)
+        whole: Iterable[str] = itertools.chain(head, lines)
+        if "".join(head[:1]).strip() in {"[", "{"}:  # what is in no other list is a line
+            # Empty lines below keep the numbers of those that follow.
+            whole = (
+                form("innermost list")
+                .sub(lambda x: x[0].replace("\n", " ") + "\n" * x[0].count("\n"), "\n".join(whole))
+                .split("\n")
+            )
+        numbered = enumerate(whole, 1)
         is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
-        table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered)
+        table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered, file.way)
+        file.ways = file.separators = table.ways
         file.lines += [f"a table, its cells separated by {_MARKS[table.separator]}"]
         for block, group in itertools.groupby(table.rows(), lambda row: row.block):
-            sample = list(itertools.islice(rows := iter(group), _SAMPLE))
+            rows = iter(group)
+            sample = [*itertools.islice(rows, _SAMPLE)]
             if block.key not in readers:
                 readers[block.key] = SignalReader(file, block, sample)
             changes.append(readers[block.key].read(block, itertools.chain(sample, rows)))
     file.problems.raise_if_any()
     table_changes = np.concatenate(changes).view(np.recarray)
-    file.changes = table_changes[np.argsort(table_changes.line, kind="stable")]
+    file.changes = table_changes[table_changes.line.argsort(kind="stable")]
+    # Below the last row text may stand.
+    table.strays += [number for number in table.words if number < file.last_row]
     file.rows += len(table.strays)
-    file.unread += [row.line for row in table.strays]
+    file.unread += table.strays
     if not len(file.changes):
         notes = "".join(f"; {note}" for note in file.notes)
         file.problems.refuse(1, "nothing_passes" if file.rows else "no_edges", notes=notes)
@@ -99,7 +111,7 @@ class SignalReader:
             values = {"numbers": durations, "lacks": "a column of times (s, ms, µs, ns) or a rate"}
             line = (block.headings or sample)[0].line
             file.problems.refuse(line, "durations" if durations else "no_rate", **values)
-        used = {column.role: column for column in columns[::-1]}
+        used = {column.role: column for column in reversed(columns)}
         is_filled = 2 * sum(value.filled for _, value, _ in self.signals) > len(self.signals)
         has_volts = "volts" in used
         self.places = {x: used[x] for x in ("run", "gate") if x in used and not has_volts}
@@ -110,19 +122,21 @@ class SignalReader:
         file.notes += [make_reason("columns_unused", columns=unused)] if unused else []
         file.lines += [f"  {column}" for column in columns]
         called = {re.sub("[0-9]+", "", clock.name) for clock in self.clocks if not clock.run}
-        is_wide = len(self.clocks) > len(called) == 1 and not self.is_sampled
-        is_guess = file.ways > 1 or any(x.filled <= _SPARSE for x in self.places.values())
-        file.facts |= {*self.places, *["wide"] * is_wide, *["guess"] * is_guess}
-        file.facts |= {"sampled"} if self.is_sampled else set()
+        held = {
+            "wide": len(self.clocks) > len(called) == 1 and not self.is_sampled,
+            "guess": file.ways > 1 or any(x.filled <= _SPARSE for x in self.places.values()),
+            "sampled": self.is_sampled,
+        }
+        file.facts |= {*self.places, *facts_held(held)}
 
     def read(self, block: RowBlock, rows: Iterable[Row]) -> Records:
         """Return the changes that rows say; a row may say that nothing changes, or be unread."""
-        file, self.block, self.count = self.file, block, 0
-        self.starts, self.states = dict[int, int](), dict[tuple[object, ...], str]()
+        file, self.block = self.file, block
+        self.starts, self.states = dict[int, int](), dict[Any, str]()
         self.words, self.times = dict[int, str](), array("d")
         self.changes, self.samples = list[Any](), [array("d") for _ in self.signals]
         signals, first = [*enumerate(self.signals)], self.clocks[0].at
-        for row in rows:
+        for self.count, row in enumerate(rows):
             ticks = {clock.at: self._read_time(row, clock) for clock in self.clocks}
             for role, column in self.places.items():
                 # Of merged cells only the first has a text.
@@ -134,10 +148,10 @@ class SignalReader:
             timed = {at for at, tick in ticks.items() if tick is not None}
             if not read or read != timed or any(row.texts[self.width :]):
                 file.unread.append(row.line)
-            self.count += 1
             if len(self.changes) > MAX_EVENTS:
                 file.problems.refuse(row.line, "too_many_events", limit=MAX_EVENTS)
-        file.rows += self.count
+        file.rows += self.count + 1
+        file.last_row = row.line
         for n, signal in signals:
             if signal.value.role == "volts":
                 self._find_crossings(n)
@@ -160,9 +174,10 @@ class SignalReader:
         if clock.role != "time":
             tick = round(self.base[0] * TICK_HZ + self.base[1] * tick)
         latest = self.latest.get(clock.at, tick)  # of the block above, too: a counter goes on
-        for wrap in OVERFLOWS_PS.get(clock.power, ()) if tick < latest else ():
-            pause = (tick - latest) % wrap
-            tick = latest + pause if pause < _TURN else tick
+        if tick < latest:
+            for wrap in HALF_DAY, *(n * 10 ** (12 - (clock.power or 0)) for n in OVERFLOWS):
+                pause = (tick - latest) % wrap
+                tick = latest + pause if 8 * pause < wrap else tick
         if self.is_sampled and clock.at in self.starts and tick < latest:
             self.file.problems.add(*row.place(clock.at), "time", "backwards", text=text)
         self.starts.setdefault(clock.at, tick)
@@ -177,10 +192,12 @@ class SignalReader:
             return False
         if self.words.get(n) == word:  # in nearly all rows of levels
             return True
+        volts = volts_of(word) if value.role == "volts" else None
+        if volts is not None:
+            self.samples[n].extend((row.line, tick - self.starts[clock.at], volts))
+            return True
         state = meaning_of(value.role, value.words.get(word, word) or value.state)
-        if value.role == "volts" and is_number(word):
-            self.samples[n].extend((row.line, tick - self.starts[clock.at], float(word)))
-        elif state is None:
+        if state is None:
             self._reject(row, value, word)
         elif state or not self.is_sampled:
             if self.is_whole and not self.places:
@@ -203,14 +220,17 @@ class SignalReader:
     def _find_crossings(self, n: int) -> None:
         """Keep where volts cross the middle; note how many do, or that nothing passes."""
         clock, _, label = self.signals[n]
+        if not self.samples[n]:
+            self.file.notes.append(make_reason("no_samples", input=label))
+            return
         samples = np.array(self.samples[n]).reshape(-1, 3)
         level, crossings = find_crossings(samples)
         code, values = "crossings", {"crossings": len(crossings), "level": level}
         if level is None:
-            low, high = (limit(samples[:, 2], default=0.0) for limit in (min, max))
-            code, values = "no_passage", {"low": low, "high": high}
+            code, values = "no_passage", {"low": min(samples[:, 2]), "high": max(samples[:, 2])}
         self.file.notes.append(make_reason(code, input=label, **values))
-        for line, offset, is_high in crossings.tolist():
+        # A last value may be cut off.
+        for line, offset, is_high in crossings[crossings[:, 0] < self.file.last_row].tolist():
             state = STATES.index("high" if is_high else "low")
             tick = self.starts[clock.at] + round(offset)
             self.changes.append((int(line), tick, state, *self._place_of(n), False))
@@ -219,6 +239,12 @@ class SignalReader:
         """Note a cell whose value is not accepted."""
         accepted = roles()[column.role][1]
         self.file.problems.reject(*row.place(column.at), column.role, text, accepted)
+
+
+@lru_cache(10_000)
+def volts_of(word: str) -> float | None:
+    """Return a number of volts, infinite beyond an instrument's range; `None` for others."""
+    return float(word) if is_number(word) else _BEYOND.get(state_of(word))
 
 
 @lru_cache(10_000)

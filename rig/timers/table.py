@@ -72,7 +72,7 @@ class RowBlock:
             self.headings += self.above
         self.key = width, *(tuple(row.texts) for row in self.headings)
 
-    def find_heading(self, width: int, filled: Collection[int]) -> Row | None:
+    def find_heading(self, width: int, filled: Collection[int]) -> Row:
         """Return the row with most cells that are known, the lowest of those with most names.
 
         Above and below may stand symbols and units. Above settings, rows with a measured number,
@@ -84,39 +84,43 @@ class RowBlock:
         filled
             Columns that have values.
         """
-        is_setting, ranked = form("assignment").search, list[tuple[int, int, Row]]()
-        remarks = [x for x in self.remarks if len(x.texts) == width and not is_setting(x.texts[0])]
+        ranked = list[tuple[int, int, Row]]()
+        remarks = [x for x in self.remarks if len(x.texts) == width < 2 * x.count_known()]
+        remarks = [x for x in remarks if not form("assignment").search(x.raw)]
         for row in self.headings or remarks:
-            if any(map(_is_value, row.texts)) and not form("time and numbers").fullmatch(row.raw):
+            # A measured number, perhaps of an input that it names: ``CH1:2E-04``.
+            bare = (
+                x.removeprefix(vocabulary.find_label(x, "gate")).lstrip(":= ") for x in row.texts
+            )
+            if any(map(is_measured, bare)) and not form("time and numbers").fullmatch(row.raw):
                 ranked = [rank for rank in ranked if rank[0] >= len(filled)]
             elif (
                 (known := row.count_known(filled))
                 and len(row.texts) > width - 2  # rows may end with a separator
-                and all(_UNFILLED & roles_in(text) for text in filter(None, row.texts[width:]))
+                and all(_UNFILLED & roles_in(text) for text in row.texts[width:] if text)
             ):
                 ranked.append((known, len({*row.texts}), row))
-        return max(reversed(ranked), key=lambda rank: rank[:2], default=(0, 0, None))[-1]
+        return max(reversed(ranked), key=lambda rank: rank[:2], default=(0, 0, Row(0, [])))[-1]
 
     def find_time_base(self) -> TimeBase:
         """Return the first sample's time and the step, s, that settings state; 0 without."""
         stated, rows = dict[str, float](), [*self.remarks, *self.headings]
-        for above, below in itertools.pairwise([*rows, *rows[-1:]]):
+        for above, below in itertools.pairwise([*rows, Row(0, [])]):
             for n, text in enumerate(above.texts):
-                for value in ("", above.cell(n + 1), below.cell(n)):
-                    setting = form("stated value").fullmatch(f"{text[:60]} {value[:60]}".strip())
-                    name, number, unit = setting.groups() if setting else ("", "", "")
+                texts = [f"{text[:60]} {x[:60]}" for x in ("", above.cell(n + 1), below.cell(n))]
+                for setting in filter(None, map(form("stated value").fullmatch, texts)):
+                    name, number, unit = setting.groups()
                     power = _UNITS.get(vocabulary.unit_of(unit.lower()) or unit.lower())
-                    role = next((x for x in ("rate", "start", "step") if x in roles_in(name)), "")
-                    if role and power is not None:
-                        stated.setdefault(role, float(number.replace(",", ".")) / 10.0**power)
+                    if power is not None:
+                        value = float(number.replace(",", ".")) / 10.0**power
+                        stated = dict.fromkeys(roles_in(name), value) | stated
         step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
         return stated.get("start", 0.0), step
 
     def find_inputs(self, count: int) -> list[str]:
         """Return names of inputs without a heading: those of a row that lists as many."""
         for row in [*self.remarks, *self.headings]:
-            labels = [vocabulary.find_label(text.rpartition(":")[2], "gate") for text in row.texts]
-            if len(named := [*filter(None, labels)]) == count:
+            if len(named := form("gate label").findall(row.raw)) == count:
                 return named
         return [*"ABCDEFGHIJKLMNOPQRSTUVWXYZ"]  # for a number may be taken for that of a gate
 
@@ -161,7 +165,7 @@ class Row(NamedTuple):
     @property
     def is_heading(self) -> bool:
         """Whether it stands above its block again, or has no numbers and is known by half."""
-        return not any(map(is_number, self.texts)) and (
+        return not any(map(is_measured, self.texts)) and (
             self.texts in [row.texts for row in self.block.headings]
             or 0 < len(self.texts) <= 2 * self.count_known()
         )
@@ -191,20 +195,21 @@ class Table:
         Of the cells; a blank stands for any number of blanks, nothing for words between values.
     remarks
         Lines that are marked as such, without the mark, as far as read.
-    strays
-        Lines between rows that are neither rows nor headings, as far as read.
+    strays, words
+        Lines among rows that are neither rows nor headings: with a value, or without.
     """
 
-    def __init__(self, lines: Iterable[tuple[int, str]]) -> None:
-        self.remarks, self.strays = list[Row](), list[Row]()
+    def __init__(self, lines: Iterable[tuple[int, str]], way: int = 0) -> None:
+        self.remarks, self.strays, self.words = list[Row](), list[int](), list[int]()
         unwrapped = ((number, piece) for number, line in lines for piece in _unwrap(line))
         sample = list(itertools.islice(unwrapped, _SAMPLE))
         self._lines = itertools.chain(sample, unwrapped)
         plain = [line for _, line in sample if line.strip() and not vocabulary.is_remark(line)]
         self._names, named = _find_names(plain)
-        self.separator = find_separator(plain, named)
+        separators = find_separators(plain, named)
+        self.ways, self.separator = len(separators), separators[way % len(separators)]
         self._usual: _Shape = ()
-        shapes = Counter(x for x in (_shape(self.split(y)) for y in plain) if any(map(all, x)))
+        shapes = Counter(x for x in map(_shape, map(self.split, plain)) if any(map(all, x)))
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
 
@@ -220,13 +225,16 @@ class Table:
         cells = split_cells(line, self.separator, self._usual)
         missing, has_comma = vocabulary.words()["missing"], form("decimal comma").fullmatch
         cells = ["" if text[:5].casefold() in missing else text for text in cells]
+        if form("apart").search(line):
+            grouped = form("grouped").fullmatch
+            cells = [form("mark of thousands").sub("", x) if grouped(x) else x for x in cells]
         return [text.replace(",", ".") if has_comma(text[:LONGEST]) else text for text in cells]
 
     def rows(self) -> Iterator[Row]:
         """Yield each row of data."""
         block, is_plain = RowBlock(self.remarks, []), form("plain row").fullmatch
         if not self.separator:
-            block.headings.append(Row(0, [name for name, _ in self._names], "", block))
+            block.headings.append(Row(1, [name for name, _ in self._names], "", block))
         for number, line in self._lines:
             if not line.strip():
                 continue
@@ -241,17 +249,19 @@ class Table:
                 block = self._next_block(block, line if is_mark else "")
                 block.headings += [] if is_mark else [row]
             elif mark:
-                self.remarks += [row] if number <= _SAMPLE else []
+                self.remarks += [row] if number <= _SAMPLE and not block.width else []
             elif not self.separator and len(row.texts) > len(self._names):
-                self.strays.append(row)
+                self.strays.append(row.line)
             elif self._is_row(row):
                 if not block.width:
                     block.begin(len(row.texts))
                 yield row
+            elif block.width and any(row.texts):
+                (self.strays if any(map(kinds_of, row.texts)) else self.words).append(number)
             elif any(row.texts):
                 if len(block.headings) > _SAMPLE:
                     return
-                (self.strays if block.width else block.headings).append(row)
+                block.headings.append(row)
 
     def _next_block(self, last: RowBlock, mark: str) -> RowBlock:
         """Return the block below a mark; a run or gate goes on until a mark names another."""
@@ -265,18 +275,14 @@ class Table:
         if _begins_as(row.texts, self._usual):  # as most, perhaps with words behind
             return True
         # Above rows of several cells may stand a date, or a count.
-        is_data = (len(row.texts) > 1 or len(self._usual) < 2) and any(map(is_measured, row.texts))
+        is_data = (row.texts[1:] or len(self._usual) < 2) and any(map(is_measured, row.texts))
         if is_data and all(map(kinds_of, filter(None, row.texts))):
             return True
         # One of data with a fault: some of it is a number, as in those above, or below their names.
         above = (x.texts for x in row.block.headings if len(x.texts) == x.count_known())
         widths = {row.block.width, *map(len, above)}
-        return any(map(is_number, row.texts)) and len(row.texts) in widths
-
-
-def _is_value(text: str) -> bool:
-    """Whether a cell has a measured number, perhaps of an input that it names: ``CH1:2E-04``."""
-    return is_measured(text.removeprefix(vocabulary.find_label(text, "gate")).lstrip(":= "))
+        is_setting = roles_in(row.texts[0]) & vocabulary.TIME_BASE
+        return any(map(is_number, row.texts)) and len(row.texts) in widths and not is_setting
 
 
 def split_cells(line: str, separator: str, usual: _Shape = ()) -> list[str]:
@@ -319,14 +325,14 @@ def _named_values(line: str) -> list[tuple[_Name, str]]:
 
 def _find_names(lines: Sequence[str]) -> tuple[list[_Name], int]:
     """Return what most lines name before their values, and how many values they name so."""
-    rows = Counter(tuple(name for name, _ in _named_values(line)) for line in lines[-_JUDGED:])
+    rows = Counter(tuple(dict(_named_values(line))) for line in lines[-_JUDGED:])
     del rows[()]
     usual, count = next(iter(rows.most_common(1)), ((), 0))
     is_named = any(name[1:] for name, _ in usual) and 2 * count > rows.total()
     return ([*usual], count * len(usual)) if is_named else ([], 0)
 
 
-def find_separator(lines: Sequence[str], named: int) -> str:
+def find_separators(lines: Sequence[str], named: int) -> list[str]:
     """Find what stands between the cells: what leaves most values in the lines with a number.
 
     Parameters
@@ -334,28 +340,24 @@ def find_separator(lines: Sequence[str], named: int) -> str:
     named
         How many values stand between words; where most do, nothing else is between them.
     """
-    rows = [line[:1000].strip() for line in lines if re.search("[0-9]", line[:1000])][-_JUDGED:]
-    is_named = any(re.search("[A-Za-z][A-Za-z0-9]", line) and "," in line for line in lines[:200])
-    pairs = [row.split(",") for row in rows if form("decimal comma").fullmatch(row)]
-    numbers = [float(".".join(pair)) for pair in pairs]
-    if 2 * len(pairs) > len(rows) and not is_named and sorted(numbers) == numbers:
-        # Times go on with decimal commas; but few numbers that return are states, or gates, and
-        # numbers that all rise are times themselves.
-        parts = [*itertools.chain(*pairs)]
-        is_time = all(map(str.isdigit, parts)) and sorted(parts, key=int) == parts
-        if not is_time and len({*parts[1::2]}) > min(2 + len(pairs) // 4, len(pairs) // 2):
-            return ";"
-    counts = {"": (named, 0)} if named else {}
+    rows = [line[:1000].strip() for line in lines if re.search("[0-9]", line)][-_JUDGED:]
     marks = [mark for mark in "\t;|" if 2 * sum(mark in row for row in rows) > len(rows)]
+    headings = {x.count(",") for x in lines if not re.search("[0-9]", x)}
+    has_heading = any(row.count(",") in headings - {0} for row in rows[-1:])
+    counts = {"": (named, 0)} if named and not has_heading else {}
     for mark in marks or ", ":
         cells = [kinds_of(text) for row in rows for text in split_cells(row, mark) if text]
         counts[mark] = 2 * sum(map(bool, cells)) - len(cells), len(cells)
-    return max(counts, key=counts.__getitem__)
+    # Where a line is a number with a comma, falls decide whether it is two.
+    commas = [*filter(form("decimal comma").fullmatch, rows)]
+    is_open = 2 * len(commas) > len(rows) and not has_heading
+    return [*[";"] * is_open, max(counts, key=counts.__getitem__)]
 
 
 def _begins_as(texts: Sequence[str], usual: _Shape) -> bool:
-    """Whether the first cells are as those of most rows."""
-    return usual != () and _shape(texts[: len(usual)]) == usual
+    """Whether the first cells are as those of most rows, perhaps with a setting to the left."""
+    left = next((n - 1 for n, cell in enumerate(usual) if any(cell) and n), 0)
+    return usual != () and _shape(texts[: len(usual)])[left:] == usual[left:]
 
 
 def _shape(texts: Sequence[str]) -> _Shape:

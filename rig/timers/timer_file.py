@@ -23,12 +23,8 @@ STATES = ("", "clear", "blocked", "low", "high")
 nothing where the file does not say."""
 
 
-def record_type(fields: str) -> np.dtype[np.void]:
-    """Return the type of rows with such fields, each ``name:type``."""
-    return np.dtype([tuple(field.split(":")) for field in fields.split()])
-
-
-CHANGE = record_type("line:i4 tick:O state:i1 run:i4 label:i4 clock:i4 block:i4 first:?")
+CHANGE = np.dtype("i4,O,i1,i4,i4,i4,i4,?")
+CHANGE.names = "line", "tick", "state", "run", "label", "clock", "block", "first"
 """A change at an input: its line; its time, ps (of a date it needs more than 64 bits); which of
 `STATES` begins; what the file calls the run and the input (places in `TimerFile.names`); which
 column of times it is of, where several are alike; the block of rows; and whether it is a first row,
@@ -45,8 +41,8 @@ class TimerFile:
     ----------
     path
         Where it is.
-    way, ways
-        In which way, from 0, its columns are understood, and how many there are.
+    way, ways, separators
+        In which way, from 0, its columns are understood; how many there are, and separators.
     lines
         In words: what kind of file, and what each column was taken for.
     names
@@ -64,8 +60,8 @@ class TimerFile:
         that is no gate; ``wide``, a row has several times that are called alike, so that each may
         be of a run; ``guess``, rows lack the name of their run or gate, so that falls decide;
         ``run`` and ``gate``, rows say them, and a run may go on in another block.
-    rows
-        How many lines of data there are.
+    rows, last_row
+        How many lines of data there are, and the number of the last.
     unread
         Those that neither change anything nor say that nothing changes.
     notes
@@ -79,6 +75,7 @@ class TimerFile:
     path: str | Path
     way: int = 0
     ways: int = 1
+    separators: int = 1
     lines: list[str] = field(default_factory=list)
     names: dict[str, int] = field(
         default_factory=lambda: defaultdict(itertools.count(1).__next__, {"": 0})
@@ -88,6 +85,7 @@ class TimerFile:
     powers: set[int | None] = field(default_factory=set)
     facts: set[str] = field(default_factory=set)
     rows: int = 0
+    last_row: int = 0
     unread: list[int] = field(default_factory=list)
     notes: list[Reason] = field(default_factory=list)
     stated: dict[str, Any] = field(default_factory=dict)

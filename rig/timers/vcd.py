@@ -23,7 +23,7 @@ def vcd_rows(lines: Iterator[tuple[int, str]], problems: ProblemList) -> Iterato
             1, "no_rate", lacks="a $timescale of 1, 10 or 100 s to ps, or without a wire of one bit"
         )
     unit = f"e-{(POWERS | {'ps': 12})[scale[2]] - scale[1].count('0')}"
-    yield 0, ",".join(["time (s)", *names.values()])
+    yield 1, ",".join(["time (s)", *names.values()])
     at, time, levels, changes = 0, "0", dict.fromkeys(names, "x"), dict[str, str]()
     for number, word in _words(lines):
         value, wire = word[0], word[1:]

@@ -43,7 +43,7 @@ def read_video(path: str | Path) -> VideoTrack:
     rows = list(table.rows())
     track = [row for row in rows if row.block is rows[0].block]
     above = rows[0].block.headings if rows else []
-    heading = next((row for row in above[::-1] if len(_find_axes(row)) == len(_SCALES)), None)
+    heading = next((row for row in reversed(above) if len(_find_axes(row)) == len(_SCALES)), None)
     if heading is None:
         problems.refuse(1, "no_track")
     axes = sorted(_find_axes(heading).items())
@@ -52,7 +52,7 @@ def read_video(path: str | Path) -> VideoTrack:
             accepted = f"a unit of this column: {', '.join(filter(None, _SCALES[name]))}"
             problems.reject(*heading.place(n), heading.cell(n), unit, accepted)
         for row in track:
-            if row.cell(n) and not is_number(row.cell(n)):
+            if not is_number(row.cell(n) or "0"):
                 problems.reject(*row.place(n), name, row.cell(n), "a number")
     problems.raise_if_any()
     places = np.array(

@@ -12,9 +12,12 @@ from rig.text_rows import read_rows
 POWERS = {"s": 0, "ms": 3, "0.1 ms": 4, "us": 6, "ns": 9}
 """Decimal power from seconds, by the unit's name."""
 SYMBOLS = {0: "s", 3: "ms", 4: "0.1 ms", 6: "µs", 9: "ns", None: "an unknown unit"}
+TIME_BASE = {"start", "step", "rate"}
+"""Roles of settings that say the times of samples."""
 LONGEST = 200
 """Characters: no cell, and no line of named values, is longer."""
 
+_STATES = "one", "zero", "blocked", "clear", "high", "low", "above", "below", "unknown", "missing"
 _KINDS = "number", "comma number", "clock", "timed", "input"
 _DETAILS = "whole", "bit", "count", "fraction", "stamp"
 _FAMILIES = {"blocked": "beam", "clear": "beam", "high": "signal", "low": "signal"}
@@ -61,7 +64,7 @@ def normal(heading: str) -> str:
 def roles_in(heading: str) -> frozenset[str]:
     """Return the roles of which a heading has a word, and ``setting`` where it names one."""
     facts = {role for role in words() if form(f"<begin><{role}><end>").search(normal(heading))}
-    is_setting = is_number(heading) or bool({"start", "step", "rate"} & facts)
+    is_setting = is_number(heading) or bool(TIME_BASE & facts)
     facts |= {"gate"} if find_label(heading, "gate") else set()
     return frozenset(facts | ({"setting"} if is_setting else set()))
 
@@ -97,12 +100,23 @@ def state_of(text: str) -> str:
     Returns
     -------
     str
-        ``one``, ``zero``, ``blocked``, ``clear``, ``high``, ``low``, ``unknown``, ``missing``, or
-        an empty text.
+        ``one``, ``zero``, ``blocked``, ``clear``, ``high``, ``low``, ``above``, ``below`` (of what
+        is measured), ``unknown``, ``missing``, or an empty text.
     """
     word = without_accents(text[:80]).casefold()
     word = re.sub(r"(?<=[01])[.,]0{0,30}(?:e[+-]?0{1,3})?$", "", word)
-    roles = ("one", "zero", "blocked", "clear", "high", "low", "unknown", "missing")
+    roles = [
+        "one",
+        "zero",
+        "blocked",
+        "clear",
+        "high",
+        "low",
+        "above",
+        "below",
+        "unknown",
+        "missing",
+    ]
     return next((role for role in roles if word in words()[role]), "")
 
 
@@ -145,12 +159,12 @@ def holds(rule: str, facts: Collection[str]) -> bool:
 
 def is_remark(line: str) -> bool:
     """Whether a line is marked as a remark."""
-    return form("remark").match(line[:LONGEST]) is not None
+    return form("remark").match(line) is not None
 
 
 def number_of(label: str) -> int | None:
     """Return the number in an input's name: 3 of D3, of ``Channel 3 (V)`` and of 3.0."""
-    if is_number(label) and abs(float(label)) < LONGEST:
+    if is_number(label) and float(label) < LONGEST:
         return int(float(label))
     match = re.search(r"([0-9]{1,9})$", re.sub(r"[\[(].*", "", label).strip())
     return int(match[1]) if match else None

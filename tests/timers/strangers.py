@@ -161,10 +161,10 @@ def strangers() -> dict[str, Shape]:
 NOT_READ = {
     "Runs by a word alone", "Written by hand",
     "A channel for all gates", "Samples of a channel for all gates",
-    "Durations", "A summary below", "A word below", "A name for two columns",
+    "Durations", "A summary below", "A name for two columns",
     "Minutes and seconds", "Seconds that are called minutes",
     "More names than columns", "Samples with an index",
-    "Two tables", "Twice the same", "Changes in nanoseconds", "Thousands apart",
+    "Two tables", "Twice the same", "Changes in nanoseconds",
     "Thousands by points", "Microseconds as if they were seconds",
     "The last row cut", "A row twice", "An unknown column in a unit of time",
 }  # fmt: skip
