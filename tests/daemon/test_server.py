@@ -127,6 +127,9 @@ async def test_a_snapshot_has_every_section_that_is_promised(door):
         "url": "sim://", "simulated": True, "path": "sim://",
     }  # fmt: skip
     assert client.replica.state["clients"] == 1
+    assert door.server.published.watched
+    await client.call("unsubscribe")
+    assert not door.server.published.watched
     await client.close()
 
 

@@ -20,6 +20,7 @@ from rig.link.messages import TEST_RUN, Arm, Phase, RefusalReason, pack_label
 from rig.recorder.controller import Controller
 from rig.recorder.published import PublishedState
 from tests.daemon.rig_in_a_box import Box, Trouble
+from tests.session.altering import alter
 from tests.tables import read_table
 
 TABLE = read_table(__file__, "states")
@@ -122,8 +123,9 @@ def box(tmp_path, monkeypatch):
 def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(box):
     box.arm()
     assert box.worker.published.get("phase") == "armed"
+    line = box.line
     box.worker.controller.close()
-    assert box.phase is Phase.IDLE
+    assert (box.phase, line.is_open) == (Phase.IDLE, False)
     box.kill()
     box.resume()
     box.arm()
@@ -174,11 +176,16 @@ def test_what_gates_see_is_shown_though_nobody_is_in_control(box):
 
 
 def test_a_test_of_the_release_tells_what_was_seen_of_it(box):
-    box.board.lab.drop = lambda _label: [(0.2, 1, True), (0.3, 1, False)]
+    """It is watched for half a second behind the pulse, and stands beside the drop before it."""
+    box.arm()
+    box.fire_latest()
+    box.passed(1.0)
+    box.board.lab.drop = lambda _label: [(0.2, 1, True), (0.579, 1, False), (0.5805, 0, True)]
     box.board.sense(0.012)
-    seen = box.asked(lambda c: c.test_release())
-    assert (seen["edges"], seen["gates"], seen["faults"]) == (2, [1], [])
+    seen, phase = box.asked(lambda c: (c.test_release(), c.published.get("phase")))
+    assert (seen["edges"], seen["gates"], seen["faults"], phase) == (2, [1], [], "idle")
     assert seen["release_sense_s"] == pytest.approx(0.012, rel=0.01)
+    assert box.worker.published.get("drop")["state"] == "recorded"
 
 
 def test_a_test_of_the_release_needs_control_a_session_nothing_armed_and_a_closed_stop(box):
@@ -279,6 +286,24 @@ def test_what_fails_is_in_the_state_before_it_is_answered(box):
     box.turned()
     assert seen == ["the disk is full"]
     assert box.board._controller.phase is not Phase.ARMED, "what cannot be kept must not fall"
+
+
+def test_what_waits_for_the_disk_is_said_once_and_only_where_anything_does(box):
+    full, session = SessionError("the disk is full"), box.worker.controller.session
+    session.commit()
+    box.worker._weigh(full)
+    session.log_bytes("rx", 1, b"x")
+    box.worker._weigh(full)
+    assert len(full.reasons) == 1
+
+
+def test_what_the_board_holds_otherwise_than_the_session_is_not_forgotten(box):
+    box.arm()
+    box.worker.controller.recorder.device.acknowledge = lambda *_: box.killed()
+    box.fire_latest()
+    alter(box.session, 'UPDATE "drop" SET fire_tick = fire_tick + 1')
+    assert "the device holds another drop of run 1, attempt 1" in str(box.resume())
+    assert box.phase is Phase.HOLDING
 
 
 def test_stop_answers_what_waits(box):

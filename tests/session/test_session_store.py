@@ -118,12 +118,13 @@ def test_a_file_of_an_older_format_is_read_and_continued(filled, version):
         assert session.host_breaks() == [BREAK][: len(pulses)]
     examined = examine(path)
     assert (examined.damage, len(examined.rows.tables["drop"])) == ([], 2)
-    third = replace(DEVICE_DROP, run=3)
+    more = [replace(DEVICE_DROP, attempt=number) for number in (2, 3)]
+    for drop in more:
+        with Session.open(path) as session:
+            session.add_drop(drop)
     with Session.open(path) as session:
-        session.add_drop(third)
         session.add_timing(PULSE._replace(number=1))
-    with Session.open(path) as session:
-        assert list(session.drops()) == [without, IMPORTED, third]
+        assert list(session.drops()) == [without, IMPORTED, *more]
         assert session.pulses() == [*pulses, PULSE._replace(number=1)]
     new = path.with_name("new.rig")
     make(new).close()
@@ -200,7 +201,8 @@ def test_a_record_that_waits_for_the_disk_and_is_refused_then_is_told_of(path):
 
 
 def test_readers_beside_a_writer_see_what_is_committed(path):
-    with make(path) as writer, Session.open(path, readonly=True) as reader:
+    make(path).close()
+    with Session.open(path, readonly=True) as reader, Session.open(path) as writer:
         writer.log_bytes("rx", 1, b"x")
         assert list(reader.byte_log()) == []
         writer.commit()
