@@ -232,6 +232,9 @@ def test_a_signal_waits_only_while_something_falls():
         interrupts._note()
         assert client.call("collect") == {}
         refused(KeyboardInterrupt, "", client.call, method)
+    interrupts._note()
+    interrupts._note()
+    refused(KeyboardInterrupt, "", interrupts._note)
 
 
 def test_what_falls_is_shown_while_it_falls_and_frames_out_of_order_are_not():

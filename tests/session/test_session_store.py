@@ -14,6 +14,7 @@ from rig.reasons import make_reason, plain_reason
 from rig.records import Certificate, ClockSample, Drop, Edge, HostBreak, Pulse
 from rig.recover.examine import examine
 from rig.recover.save import save
+from rig.session.drop_check import ByteReplay
 from rig.session.hashes import check_chain, protocol_first
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, TABLES, RunState
 from rig.session.store import Session
@@ -84,7 +85,9 @@ def test_everything_comes_back_as_it_went_in(path):
         assert session.pings() == [ClockSample(1, 2, 3), ClockSample(4, 5, 2**32 - 1)]
         assert (session.pulses(), session.host_breaks()) == ([PULSE], [BREAK])
         assert [file[1:] for file in session.attached_files()] == [("rig µ.jpg", b"\xff\xd8")]
-        assert list(session.drops()) == [DEVICE_DROP, IMPORTED]
+        replay = ByteReplay()
+        assert list(session.drops(replay)) == [DEVICE_DROP, IMPORTED]
+        assert replay.fed == 2
         assert session.latest_drops() == [IMPORTED, DEVICE_DROP]
         assert [entry.state for entry in session.states()] == [RunState.PLANNED, RunState.VOID]
         reasons = [reason.text for reason in session.latest_state(2).reasons]
@@ -185,6 +188,16 @@ def test_a_full_disk_costs_nothing_once_there_is_room(path):
     with Session.open(path) as session:
         assert [chunk.host_ns for chunk in session.byte_log()] == [0, 1, 2]
         assert list(session.drops()) == [DEVICE_DROP, IMPORTED]
+
+
+def test_what_waits_for_the_disk_is_saved_elsewhere_when_the_file_is_lost(path):
+    with make(path) as session:
+        fill_disk(session)
+        session.add_drop(IMPORTED)
+        path.unlink()
+        refused(SessionError, "is saved as", session.commit)
+    with Session.open(f"{path}.saved-1", readonly=True) as session:
+        assert list(session.drops()) == [IMPORTED]
 
 
 def test_a_record_that_waits_for_the_disk_and_is_refused_then_is_told_of(path):
