@@ -57,14 +57,14 @@ def video_fall(times: Array, x: Array, y: Array, gates: Measured | None = None) 
         As in `VideoFall`.
     """
     design = np.vander(times - times.mean(), 3)  # centred, for numerical accuracy
-    inverse, places = np.linalg.pinv(design), np.column_stack([x, y])
+    inverse, places = np.linalg.pinv(design), x + 1j * y
     solved = inverse @ places
     residuals = places - design @ solved
-    rates = 2.0 * solved[0]
-    size = float(np.hypot(*rates))
-    along = rates / size if size else np.array([0.0, 1.0])
+    acceleration = 2.0 * solved[0]
+    size = float(np.abs(acceleration))
+    # Only scatter along the acceleration affects its size.
+    off = (residuals * np.exp(-1j * np.angle(acceleration))).real
     degrees = times.size - 3
-    off = residuals @ along  # only scatter along the acceleration affects its size
     u = 2.0 * float(np.sqrt(off @ off / degrees) * np.linalg.norm(inverse[0]))
     total = float(off @ off)
     neighbours = float(off[1:] @ off[:-1]) / total if total else 0.0

@@ -83,8 +83,9 @@ def connect(
         return Client(OwnLine(url), interrupts)
     try:
         line = Line(path, f"rig run {os.getpid()}")
-        # A board that was plugged in again may have another path than the daemon was told.
-        if not any(_is_same(line.daemon.get(name, ""), url) for name in ("port", "path")):
+        # A board has several names in /dev, and plugged in again another than the daemon was told.
+        names = {Path(line.daemon.get(name, "")).resolve() for name in ("port", "path")}
+        if Path(url).resolve() not in names:
             line.close()
             raise rig_error("daemon_port", port=line.daemon["port"], wanted=url)
     except RigError:
@@ -100,10 +101,3 @@ def connect(
         raise
     say(f"through the daemon, process {line.daemon['pid']}, which owns {url}")
     return client
-
-
-def _is_same(port: str, url: str) -> bool:
-    """Whether two names are of one port: a board has several in /dev."""
-    if "://" in port + url:
-        return port == url
-    return Path(port).resolve() == Path(url).resolve()

@@ -33,8 +33,6 @@ from rig.errors import DeviceError
 from rig.link.frames import PAYLOAD_LIMIT
 
 PROTOCOL_VERSION = 2
-EVENTS_PER_FRAME = (PAYLOAD_LIMIT - 6) // 6
-"""Six-byte events that fit behind an EVENTS frame's label and index."""
 HOST_SILENCE_MS = 250
 """An armed device that heard no request for so long disarms itself."""
 TEST_RUN = 0
@@ -54,6 +52,8 @@ class Event(NamedTuple):
 
 EVENT = struct.Struct("<IH")
 """An `Event` on the wire."""
+EVENTS_PER_FRAME = PAYLOAD_LIMIT // EVENT.size - 1
+"""Events that fit into an EVENTS frame, whose label and index take the place of one."""
 
 
 def pack_events(events: Iterable[tuple[int, int]]) -> bytes:

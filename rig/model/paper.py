@@ -40,7 +40,7 @@ def graded_chain() -> Chain:
     halves = [(lower + upper) / 2 for lower, upper in pairwise(GRADED_DIAMETERS)]
     gap = (LENGTH - sum(halves)) / len(halves)
     heights = (*accumulate((gap + half for half in halves[:-1]), initial=0.0), LENGTH)
-    return Chain(tuple((d / GRADED_DIAMETERS[0]) ** 2 for d in GRADED_DIAMETERS), heights)
+    return Chain(tuple(d**2 for d in GRADED_DIAMETERS), heights)
 
 
 def graded_fall() -> tuple[list[Hit], list[float]]:

@@ -29,8 +29,8 @@ class StateFeed:
     def __init__(self, published: PublishedState) -> None:
         self._published = published
         self._tick_hz = 0
-        self._label = 0  # of the drop that is armed or falls; 0 for none
-        self._gates = 0  # of the armed gates, at the last event shown
+        # Of the drop that is armed or falls, 0 for none; and its gates at the last event shown.
+        self._label = self._gates = 0
 
     def know(self, record: Record) -> None:
         """Take what became known on the line."""

@@ -190,7 +190,7 @@ class Recorder:
     def held(self) -> tuple[int, int] | None:
         """Run and attempt of a drop the device still holds, or `None`."""
         state = self.device.status()
-        if state.phase in {Phase.HOLDING, Phase.RECORDING} and state.label:
+        if state.phase in {Phase.HOLDING, Phase.RECORDING}:
             return unpack_label(state.label)
         return None
 

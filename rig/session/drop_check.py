@@ -16,7 +16,6 @@ from rig.link.messages import TEST_RUN, pack_events
 from rig.link.transcript import Direction, Incoming, Restart, Transcript
 from rig.records import Certificate, ClockSample, Drop, Edge, Job, Pulse
 
-_U32 = (1 << 32) - 1
 _LATER = [field.name for field in fields(Certificate) if field.default is None]
 """Fields that certificates of older formats do not have."""
 
@@ -138,5 +137,5 @@ def _crc32(drop: Drop, fire_tick: int, events: Iterable[tuple[int, list[Edge]]])
     for tick, edges in events:
         for _, channel, blocked in edges:
             state = state | 1 << channel if blocked else state & ~(1 << channel)
-        snapshots.append(((fire_tick + tick) & _U32, state))
+        snapshots.append(((fire_tick + tick) & 0xFFFF_FFFF, state))
     return zlib.crc32(pack_events(snapshots))

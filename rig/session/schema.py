@@ -24,8 +24,8 @@ Row: TypeAlias = tuple[Any, ...]
 Record: TypeAlias = Mapping[str, Sequence[Sequence[object]]]
 """Rows that belong together, by table."""
 
-APPLICATION_ID = 0x43485247
-"""``CHRG`` in the SQLite header: this database is a chain-rig session."""
+APPLICATION_ID = int.from_bytes(b"CHRG", "big")
+"""In the SQLite header: this database is a chain-rig session."""
 
 SCHEMA_VERSION = 5
 """Stored in SQLite's ``user_version``; a program refuses files with a higher version."""

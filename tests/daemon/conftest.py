@@ -47,7 +47,7 @@ def driver(processes, client):
 @asynccontextmanager
 async def door(tmp_path):
     """Have a daemon in the test's own loop, whose simulated port is still closed."""
-    path = tmp_path / "door" / "rig.sock"
+    path = tmp_path / "of a user" / "door" / "rig.sock"
     server, ready = Server("sim://", path), asyncio.Event()
     server.serving = asyncio.create_task(server.run(ready.set))
     try:

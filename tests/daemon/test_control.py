@@ -10,7 +10,7 @@ import pytest
 from bench.invariants import broken, longest_on
 from bench.process_fixture import ProcessFixture
 from rig.daemon.lease import LEASE_S
-from rig.errors import ControlError, InputError, StoppedError
+from rig.errors import ControlError, InputError, RigError, StoppedError
 from rig.link.client import Device
 from rig.link.messages import TABLE, Abort, DropCertificate2, Fire, Phase
 from rig.session.schema import RunState
@@ -93,6 +93,7 @@ def test_any_client_stops_a_recording_and_what_there_is_is_kept(processes, armed
         lambda: log_of(processes.session)[1][-1] == (1, "recorded")
     )  # the daemon has it a little later
     one.close()
+    refused(RigError, "no session is open", getattr, one, "session")
     gone_on_with(processes)
     seen = talked(processes, Fire, Abort, DropCertificate2)
     assert seen.index(Fire) < seen.index(Abort) < seen.index(DropCertificate2)

@@ -32,6 +32,7 @@ from rig.recorder.feed import StateFeed
 from rig.recorder.interrupts import Interrupts
 from rig.recorder.published import EDGES_LIMIT, PublishedState
 from rig.recorder.recorder import NullSink
+from rig.records import Drop, Edge
 from rig.session.schema import RunState
 from tests.refusals import refused
 from tests.tables import cases, read_table
@@ -231,10 +232,14 @@ def test_a_signal_waits_only_while_something_falls():
         interrupts._note()
         assert client.call("collect") == {}
         refused(KeyboardInterrupt, "", client.call, method)
+    interrupts._note()
+    interrupts._note()
+    refused(KeyboardInterrupt, "", interrupts._note)
 
 
 def test_what_falls_is_shown_while_it_falls_and_frames_out_of_order_are_not():
     published = PublishedState()
+    published.plan([{"run": 1}])
     feed, label = StateFeed(published), wire.pack_label(1, 1)
     feed.state(1, 1, RunState.ARMED, ())
     frames = [(0, (110, 1)), (3, (140, 1), (150, 3)), (1, (120, 0))]
@@ -245,6 +250,16 @@ def test_what_falls_is_shown_while_it_falls_and_frames_out_of_order_are_not():
     assert (drop["state"], drop["fire_tick"], drop["events"]) == ("fired", 100, 5)
     assert published.snapshot()["state"]["edges"] == [(10, 0, 1), (50, 1, 1)]
     assert (published.get("gates"), published.get("phase")) == ({"blocked": 3}, "recording")
+    feed.show_drop(Drop(1, 1, 1000, (Edge(10, 0, True), Edge(20, 0, False)), 100))
+    assert published.get("phase") == "idle"
+    assert published.snapshot()["state"]["edges"] == [(10, 0, 1), (20, 0, 0)]
+    feed.state(1, 2, RunState.ARMED, ())
+    assert published.snapshot()["state"]["edges"] == []
+    feed.know(Incoming(0, 0, wire.Disarmed(1, DisarmReason.TIMEOUT)))
+    assert published.get("phase") == "idle"
+    feed.state(1, 2, RunState.INTERRUPTED, ())
+    state = published.snapshot()["state"]
+    assert state["drop"]["state"] == state["runs"][0]["state"] == "interrupted"
 
 
 def test_what_has_no_session_keeps_nothing_and_can_arm_nothing():
@@ -280,5 +295,5 @@ def test_a_session_is_shown_until_it_is_closed_and_blind_until_it_is_not(tmp_pat
     assert rig.session.unblinded
     assert rig.published.get("session") == about | {"blind": False}
     rig.close()
-    assert rig.published.get("session") is None
-    assert rig.published.get("link")["state"] == "closed"
+    state = rig.published.snapshot()["state"]
+    assert (state["session"], state["runs"], state["link"]["state"]) == (None, [], "closed")

@@ -51,8 +51,11 @@ def test_a_board_is_found_at_another_port_with_the_drop_it_holds(usb):
         assert ports == [(str(processes.port), "85430"), (os.path.realpath(elsewhere), "85430")]
 
 
-@pytest.mark.parametrize("numbers", [("85430", "999"), (None, None), ("85430", "85430")])
-def test_another_board_where_it_was_is_not_taken_for_it(usb, numbers):
+@pytest.mark.parametrize(
+    ("numbers", "other_by"),
+    [(("85430", "999"), "number 999, not 85430"), ((None, None), "id "), (("85430",) * 2, "id ")],
+)
+def test_another_board_where_it_was_is_not_taken_for_it(usb, numbers, other_by):
     with ProcessFixture(1, seed=1) as processes, ProcessFixture(1, seed=2) as other:
         usb |= {processes.port: numbers[0]}
         with working(processes) as (worker, ask):
@@ -63,6 +66,7 @@ def test_another_board_where_it_was_is_not_taken_for_it(usb, numbers):
             usb[processes.port] = numbers[1]
             processes.port.symlink_to(other.port)
             until(lambda: "another board" in str(worker.published.get("error")))
+            assert other_by in worker.published.get("error")["message"]
             assert "give the same rig run command again" in worker.published.get("error")["hint"]
             refused(DeviceError, "no connection", ask, lambda controller: controller.arm(2, 1))
             # Whoever means it says so by giving the command again.

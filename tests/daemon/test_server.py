@@ -9,6 +9,7 @@ import socket
 import stat
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from unittest.mock import Mock
 
 import pytest
 
@@ -17,7 +18,7 @@ from rig.daemon import connection, rpc, service
 from rig.daemon.client import AsyncClient, Line
 from rig.daemon.listener import Door
 from rig.daemon.socket_path import default_socket, peer_uid, prepare_folder
-from rig.errors import BusyError, DeviceError, InputError, RigError, VersionError
+from rig.errors import BusyError, ControlError, DeviceError, InputError, RigError, VersionError
 from tests.daemon.test_api_page import rows
 from tests.refusals import refused
 from tests.tables import cases
@@ -127,6 +128,9 @@ async def test_a_snapshot_has_every_section_that_is_promised(door):
         "url": "sim://", "simulated": True, "path": "sim://",
     }  # fmt: skip
     assert client.replica.state["clients"] == 1
+    assert door.server.published.watched
+    await client.call("unsubscribe")
+    assert not door.server.published.watched
     await client.close()
 
 
@@ -157,6 +161,13 @@ async def test_a_client_that_does_not_read_costs_little_and_gets_a_snapshot_when
     assert methods.count("change") < 400
     slow.close()
     await quick.close()
+
+
+async def test_a_daemon_at_which_nothing_changes_rests(door, monkeypatch):
+    looks = Mock(return_value=None)
+    monkeypatch.setattr(door.server.published, "take", looks)
+    await asyncio.sleep(0.1)
+    assert looks.call_count < 5
 
 
 def test_a_second_daemon_is_refused_and_a_dead_ones_socket_is_not_in_the_way():
@@ -273,6 +284,8 @@ async def test_whatever_a_client_is_called_all_see_it(door):
         shown = watcher.replica.state["control"]["client"]
         assert shown.isprintable()
         assert 0 < len(shown) <= 80
+        with pytest.raises(ControlError):
+            await watcher.call("wait", seconds=0.0)
         assert await client.call("stop", reason=name) == {}
         await client.close()
         while watcher.replica.state["control"] is not None:

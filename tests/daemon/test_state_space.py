@@ -20,6 +20,7 @@ from rig.link.messages import TEST_RUN, Arm, Phase, RefusalReason, pack_label
 from rig.recorder.controller import Controller
 from rig.recorder.published import PublishedState
 from tests.daemon.rig_in_a_box import Box, Trouble
+from tests.session.altering import alter
 from tests.tables import read_table
 
 TABLE = read_table(__file__, "states")
@@ -122,8 +123,9 @@ def box(tmp_path, monkeypatch):
 def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(box):
     box.arm()
     assert box.worker.published.get("phase") == "armed"
+    line = box.line
     box.worker.controller.close()
-    assert box.phase is Phase.IDLE
+    assert (box.phase, line.is_open) == (Phase.IDLE, False)
     box.kill()
     box.resume()
     box.arm()
@@ -157,6 +159,7 @@ def test_whoever_leaves_once_it_is_let_go_has_it_recorded_whole(box):
     box.turned()
     drop = box.worker.controller.session.drop(1, 1)
     assert (len(drop.edges), drop.faults) == (8, ()), "two rods at two gates"
+    assert drop.certificate.pulse_ticks / drop.tick_hz == pytest.approx(0.08, rel=0.01)
 
 
 def test_a_worker_with_nothing_to_do_rests(box):
@@ -174,11 +177,26 @@ def test_what_gates_see_is_shown_though_nobody_is_in_control(box):
 
 
 def test_a_test_of_the_release_tells_what_was_seen_of_it(box):
-    box.board.lab.drop = lambda _label: [(0.2, 1, True), (0.3, 1, False)]
+    """It is watched for half a second behind the pulse, and stands beside the drop before it."""
+    box.arm()
+    box.fire_latest()
+    box.passed(1.0)
+    box.board.lab.drop = lambda _label: [(0.2, 1, True), (0.579, 1, False), (0.5805, 0, True)]
     box.board.sense(0.012)
-    seen = box.asked(lambda c: c.test_release())
-    assert (seen["edges"], seen["gates"], seen["faults"]) == (2, [1], [])
+    seen, phase = box.asked(lambda c: (c.test_release(), c.published.get("phase")))
+    assert (seen["edges"], seen["gates"], seen["faults"], phase) == (2, [1], [], "idle")
     assert seen["release_sense_s"] == pytest.approx(0.012, rel=0.01)
+    assert box.worker.published.get("drop")["state"] == "recorded"
+
+
+def test_a_wait_lasts_as_long_as_asked_and_what_it_measures_is_on_the_disk(box):
+    def waited(controller):
+        begun_s = box.now()
+        controller.wait(1.5)
+        trip_s = controller.recorder.statistics()["round_trip_s"]
+        return box.now() - begun_s, trip_s, controller.session.pending
+
+    assert box.asked(waited) == pytest.approx((1.5, 0.005, 0), abs=0.005)
 
 
 def test_a_test_of_the_release_needs_control_a_session_nothing_armed_and_a_closed_stop(box):
@@ -192,6 +210,9 @@ def test_a_test_of_the_release_needs_control_a_session_nothing_armed_and_a_close
     box.passed(0.1)
     assert tried().reason is RefusalReason.STOPPED
     box.board.stop(False)
+    box.touched = lambda _: box.board.touch(1)
+    box.trouble = Trouble("touched", "write", 2)  # FIRE
+    assert tried().reason is RefusalReason.GATE_BLOCKED
     box.asked(lambda c: c.close_session())
     assert "not the moment" in str(tried())
     assert box.fell == []
@@ -214,7 +235,8 @@ def test_a_stop_ends_a_test_of_the_release(box, monkeypatch, deeds):
 def test_what_was_heard_of_a_port_that_is_gone_is_on_the_disk(box):
     box.pull()
     box.asked(lambda c: c.recorder.look())
-    assert box.worker.published.get("link")["state"] == "down"
+    link = box.worker.published.get("link")
+    assert (link["state"], link["retry_s"]) == ("down", 0.25)
     assert box.worker.controller.session.pending == 0
 
 
@@ -281,7 +303,36 @@ def test_what_fails_is_in_the_state_before_it_is_answered(box):
     assert box.board._controller.phase is not Phase.ARMED, "what cannot be kept must not fall"
 
 
+def test_what_waits_for_the_disk_is_said_once_and_only_where_anything_does(box):
+    full, session = SessionError("the disk is full"), box.worker.controller.session
+    session.commit()
+    box.worker._weigh(full)
+    session.log_bytes("rx", 1, b"x")
+    box.worker._weigh(full)
+    assert len(full.reasons) == 1
+
+
+def test_a_board_is_watched_without_a_session_and_its_port_is_kept_for_the_next(box):
+    box.worker.controller.close()
+    box.passed(1.5)
+    line = box.line
+    assert line.is_open
+    box.resume()
+    assert box.line is line
+
+
+def test_what_the_board_holds_otherwise_than_the_session_is_not_forgotten(box):
+    box.arm()
+    box.worker.controller.recorder.device.acknowledge = lambda *_: box.killed()
+    box.fire_latest()
+    alter(box.session, 'UPDATE "drop" SET fire_tick = fire_tick + 1')
+    assert "the device holds another drop of run 1, attempt 1" in str(box.resume())
+    assert box.phase is Phase.HOLDING
+
+
 def test_stop_answers_what_waits(box):
+    box.trouble = Trouble("stopped", "written")  # ARM
+    assert isinstance(box.arm(), StoppedError)
     waiting = [box.worker.submit(lambda c: c.opened, "A") for _ in range(2)]
     box.stop()
     assert all(isinstance(one.exception(timeout=0.0), StoppedError) for one in waiting)

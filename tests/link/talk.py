@@ -98,6 +98,7 @@ class Wire:
 
     def __init__(self, bench: Bench) -> None:
         self.port, self.clock, self.decoder = bench.port(), bench.clock(), Decoder()
+        self.numbers: list[int] = []  # of the device's frames
         self.port.write(b"\0")
         self.hear(BOOT_WAIT_S, until=lambda _, message: isinstance(message, wire.Boot))
 
@@ -112,6 +113,7 @@ class Wire:
         heard, end = [], self.clock.now_ns() + round(seconds * 1e9)
         while self.clock.now_ns() < end:
             for frame in self.decoder.feed(self.port.read(max(1, self.port.in_waiting))):
+                self.numbers.append(frame.seq)
                 heard.append((frame.ack, wire.unpack(frame.type, frame.payload)))
                 if until is not None and until(*heard[-1]):
                     until, end = None, self.clock.now_ns() + 20_000_000

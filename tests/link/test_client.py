@@ -41,6 +41,7 @@ class FakePort:
         self.clock, self.answers = clock, answers
         self.decoder, self.out = Decoder(), b""
         self.written: list[bytes] = []
+        self.frames: list[Frame] = []  # that were written
 
     @property
     def in_waiting(self) -> int:
@@ -54,6 +55,7 @@ class FakePort:
     def write(self, data: bytes) -> int:
         self.written.append(data)
         for frame in self.decoder.feed(data):
+            self.frames.append(frame)
             request = wire.unpack(frame.type, frame.payload)
             answer = self.answers.get(type(request), [])
             if answer is None:
@@ -170,8 +172,7 @@ def test_seq_wraps_around_zero(clock):
     one = Device(port, clock)
     for _ in range(300):
         one.ping()
-    seqs = [frame.seq for data in port.written for frame in Decoder().feed(data)]
-    assert seqs == [n % 254 + 1 for n in range(300)]
+    assert [frame.seq for frame in port.frames] == [n % 254 + 1 for n in range(300)]
 
 
 def test_nonsense_is_said_to_be_nonsense(clock):
@@ -209,17 +210,21 @@ def certificate(label: int, events: int, crc32: int = 0) -> wire.DropCertificate
     return wire.DropCertificate(label, 100, 0xFFFF, 0, events, crc32, 0, 0, 0, 0, 0)
 
 
+def events_frame(first, *events) -> wire.EventsFrame:
+    return wire.EventsFrame(1, first, wire.pack_events(events))
+
+
 class Liar(FakePort):
     """Says how many events it holds, and gives others."""
 
-    def __init__(self, clock, held, events):
+    def __init__(self, clock, held, *answers):
         super().__init__(clock, {wire.Identify: [IDENTITY]})
-        self.held, self.events = held, events
+        self.held, self.events = held, answers
 
     def write(self, data):
         (frame,) = Decoder().feed(data)
         count = wire.unpack(frame.type, frame.payload).count
-        self.answers[wire.Read] = [self.events if count else certificate(1, self.held, 77)]
+        self.answers[wire.Read] = self.events if count else [certificate(1, self.held, 77)]
         return super().write(data)
 
 
@@ -230,19 +235,20 @@ def test_events_that_do_not_match_the_certificate_are_a_fault(clock):
     assert make_reason("crc_mismatch") in drop.faults
 
 
-def test_a_device_that_never_gives_the_events_is_faulty(clock):
-    refused(
-        DeviceError,
-        "did not send the events",
-        Device(Liar(clock, 5, events_frame(0)), clock).fetch,
-        1,
-    )
-
-
-def test_a_device_that_refuses_even_what_it_says_it_keeps_is_not_asked_for_ever(clock):
-    port = Liar(clock, 5, wire.Refused(wire.RefusalReason.NOT_KEPT, 0))
-    error = refused(DeviceRefusedError, "", Device(port, clock).fetch, 1)
-    assert error.reason is wire.RefusalReason.NOT_KEPT
+@pytest.mark.parametrize(
+    ("held", "answers", "error", "said", "asked"),
+    [
+        (5, [events_frame(0)], DeviceError, "did not send the events", [0, 5]),
+        (5, [wire.Refused(wire.RefusalReason.NOT_KEPT, 0)], DeviceRefusedError, "", [0, 5]),
+        (50, [], DeviceTimeoutError, "did not answer", [0, 40, 40, 20, 20, 10, 10, 5, 5, 4, 4]),
+    ],
+)
+def test_who_does_not_give_what_it_holds_is_not_asked_for_ever(
+    clock, held, answers, error, said, asked
+):
+    port = Liar(clock, held, *answers)
+    refused(error, said, Device(port, clock, tries=4).fetch, 1)
+    assert [wire.unpack(frame.type, frame.payload).count for frame in port.frames] == asked
 
 
 @pytest.mark.parametrize("reason", wire.DisarmReason)
@@ -296,10 +302,6 @@ def heard(*messages) -> Transcript:
     for message in messages:
         say(transcript, "rx", message)
     return transcript
-
-
-def events_frame(first, *events) -> wire.EventsFrame:
-    return wire.EventsFrame(1, first, wire.pack_events(events))
 
 
 def test_a_gap_in_the_events_invents_no_edge():
@@ -362,8 +364,11 @@ def test_the_release_sense_counts_from_the_fire_stamp(tick, sense):
 
 
 def test_without_identity_or_certificate_the_drop_says_so():
-    drop = heard(events_frame(0, (110, 1))).pending(1)
+    transcript = heard(events_frame(0, (110, 1)))
+    drop = transcript.pending(1)
     assert (drop.edges, len(drop.faults)) == ((), 2)
+    transcript.assembly(1).fire_tick = 100
+    assert transcript.pending(1).edges == ((10, 0, True),)
 
 
 def test_what_is_no_message_is_counted():

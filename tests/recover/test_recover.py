@@ -102,7 +102,8 @@ def test_edges_that_are_lost_come_again_from_the_bytes(copy, truth, tmp_path):
         assert replay(session).lines[-1] == "identical"
 
 
-UNKNOWN = 'DELETE FROM bytes WHERE host_ns > (SELECT host_ns FROM "drop" WHERE id = 5)'
+OPEN = "DELETE FROM bytes WHERE direction = 'tx' AND host_ns >= "
+UNKNOWN = OPEN + '(SELECT host_ns FROM "drop" WHERE id = 5)'
 
 
 @pytest.mark.parametrize("before", [(), [UNKNOWN]], ids=["acknowledged", "held by the board"])

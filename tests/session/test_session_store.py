@@ -14,6 +14,7 @@ from rig.reasons import make_reason, plain_reason
 from rig.records import Certificate, ClockSample, Drop, Edge, HostBreak, Pulse
 from rig.recover.examine import examine
 from rig.recover.save import save
+from rig.session.drop_check import ByteReplay
 from rig.session.hashes import check_chain, protocol_first
 from rig.session.schema import APPLICATION_ID, SCHEMA_VERSION, TABLES, RunState
 from rig.session.store import Session
@@ -84,7 +85,9 @@ def test_everything_comes_back_as_it_went_in(path):
         assert session.pings() == [ClockSample(1, 2, 3), ClockSample(4, 5, 2**32 - 1)]
         assert (session.pulses(), session.host_breaks()) == ([PULSE], [BREAK])
         assert [file[1:] for file in session.attached_files()] == [("rig µ.jpg", b"\xff\xd8")]
-        assert list(session.drops()) == [DEVICE_DROP, IMPORTED]
+        replay = ByteReplay()
+        assert list(session.drops(replay)) == [DEVICE_DROP, IMPORTED]
+        assert replay.fed == 2
         assert session.latest_drops() == [IMPORTED, DEVICE_DROP]
         assert [entry.state for entry in session.states()] == [RunState.PLANNED, RunState.VOID]
         reasons = [reason.text for reason in session.latest_state(2).reasons]
@@ -118,12 +121,13 @@ def test_a_file_of_an_older_format_is_read_and_continued(filled, version):
         assert session.host_breaks() == [BREAK][: len(pulses)]
     examined = examine(path)
     assert (examined.damage, len(examined.rows.tables["drop"])) == ([], 2)
-    third = replace(DEVICE_DROP, run=3)
+    more = [replace(DEVICE_DROP, attempt=number) for number in (2, 3)]
+    for drop in more:
+        with Session.open(path) as session:
+            session.add_drop(drop)
     with Session.open(path) as session:
-        session.add_drop(third)
         session.add_timing(PULSE._replace(number=1))
-    with Session.open(path) as session:
-        assert list(session.drops()) == [without, IMPORTED, third]
+        assert list(session.drops()) == [without, IMPORTED, *more]
         assert session.pulses() == [*pulses, PULSE._replace(number=1)]
     new = path.with_name("new.rig")
     make(new).close()
@@ -186,6 +190,16 @@ def test_a_full_disk_costs_nothing_once_there_is_room(path):
         assert list(session.drops()) == [DEVICE_DROP, IMPORTED]
 
 
+def test_what_waits_for_the_disk_is_saved_elsewhere_when_the_file_is_lost(path):
+    with make(path) as session:
+        fill_disk(session)
+        session.add_drop(IMPORTED)
+        path.unlink()
+        refused(SessionError, "is saved as", session.commit)
+    with Session.open(f"{path}.saved-1", readonly=True) as session:
+        assert list(session.drops()) == [IMPORTED]
+
+
 def test_a_record_that_waits_for_the_disk_and_is_refused_then_is_told_of(path):
     with make(path) as session:
         session.add_drop(DEVICE_DROP)
@@ -200,7 +214,8 @@ def test_a_record_that_waits_for_the_disk_and_is_refused_then_is_told_of(path):
 
 
 def test_readers_beside_a_writer_see_what_is_committed(path):
-    with make(path) as writer, Session.open(path, readonly=True) as reader:
+    make(path).close()
+    with Session.open(path, readonly=True) as reader, Session.open(path) as writer:
         writer.log_bytes("rx", 1, b"x")
         assert list(reader.byte_log()) == []
         writer.commit()
