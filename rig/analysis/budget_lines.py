@@ -38,6 +38,11 @@ BUDGET = {
 COMMON = tuple(name for name, line in BUDGET.items() if line.common)
 
 
+def largest_first(parts: Mapping[str, float]) -> dict[str, float]:
+    """Return contributions, the largest first; what differs by rounding alone keeps its order."""
+    return dict(sorted(parts.items(), key=lambda part: -float(f"{part[1]:.6g}")))
+
+
 def effective_degrees(u: float, budget: Mapping[str, float], degrees: Mapping[str, float]) -> float:
     """Return the effective degrees of freedom by Welch–Satterthwaite (GUM G.4); at least 1.
 

@@ -208,6 +208,7 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
         if round_ > _FIRST:
             pace *= np.where(previous * last < 0.0, _SLOWER, _FASTER)
             pace[:size] = np.minimum(pace[:size], 1.0)
+            pace[size:] = np.maximum(pace[size:], _SLOWER**2)
         leap = np.maximum(np.abs(grown), 1.0)  # only small changes are made faster
         evidence.components = before.times(np.clip(pace[size:] * grown, -leap, leap))
     gains = defaultdict[str, Array](partial(np.zeros, (size, size)))

@@ -9,7 +9,7 @@ from statistics import fmean, stdev
 from typing import Any
 
 from rig.analysis.averages import by_case, mean
-from rig.analysis.budget_lines import COMMON
+from rig.analysis.budget_lines import COMMON, largest_first
 from rig.analysis.comparison import Comparison, Difference, compare
 from rig.analysis.gate_passages import GatePassage
 from rig.analysis.result import DropResult, Measured, good_runs
@@ -159,4 +159,4 @@ def _causes(runs: Sequence[Measured]) -> dict[str, float]:
     parts = {
         name: math.sqrt(fmean(run.budget.get(name, 0.0) ** 2 for run in runs)) for name in COMMON
     }
-    return dict(sorted((part for part in parts.items() if part[1]), key=lambda part: -part[1]))
+    return largest_first({name: part for name, part in parts.items() if part})

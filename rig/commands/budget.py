@@ -3,6 +3,7 @@
 from functools import partial
 from typing import Any
 
+from rig.analysis.budget_lines import largest_first
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.monte_carlo import agreement, monte_carlo
 from rig.analysis.result import Measured
@@ -73,10 +74,12 @@ def budget(
 
 def _lines(measured: Measured) -> dict[str, Any]:
     degrees = max(1.0, measured.degrees)
-    sources = sorted(measured.budget.items(), key=lambda source: -source[1])
     return {
         **measured.json(),
         "degrees": min(degrees, 1e6),
         "k": coverage_factor(degrees),
-        "lines": [{"name": name, "u": u, "share": (u / measured.u) ** 2} for name, u in sources],
+        "lines": [
+            {"name": name, "u": u, "share": (u / measured.u) ** 2}
+            for name, u in largest_first(measured.budget).items()
+        ],
     }

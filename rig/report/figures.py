@@ -9,6 +9,7 @@ from itertools import groupby, pairwise
 from operator import attrgetter, itemgetter
 from typing import TYPE_CHECKING, Any
 
+from rig.analysis.budget_lines import largest_first
 from rig.analysis.result import GOOD
 from rig.measurands import RELEASE_SKEW, SEPARATION, SPEED, Measurand, acceleration_in, averaged
 from rig.protocol.protocol import Condition
@@ -149,7 +150,7 @@ def _model_gaps(curves: Mapping[str, Any]) -> Groups:
 def _stack_bar(parts: Mapping[str, float], colors: dict[str, int]) -> Iterator[dict[str, Any]]:
     """Yield the segments of a bar, a source each, the largest first."""
     begin = 0.0
-    for name, share in sorted(parts.items(), key=lambda part: -part[1]):
+    for name, share in largest_first(parts).items():
         # Sources without a colour are merged with the others.
         color = colors.get(name) or dict(enumerate(PARTS)).get(len(colors))
         if share > _SMALL and color is not None:
