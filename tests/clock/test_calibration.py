@@ -10,10 +10,10 @@ from rig.clock.host import TOLERANCE_NS, HostClocks, HostWatch, read_clocks
 from rig.clock.rate import ping_rate, pulse_rate
 from rig.clock.samples import SEND, one_axis, samples
 from rig.link import messages as wire
-from rig.link.frames import Frame, encode
 from rig.link.transcript import Transcript
 from rig.records import ClockSample, HostBreak, Pulse
 from tests.clock.clocks import HZ, Clock, compared, moved, ppm, seconds
+from tests.link.talk import framed
 
 S = 10**9
 
@@ -184,11 +184,9 @@ def talk(*parts):
     """Feed messages in turn; requests have seq 1, 2, …."""
     transcript, found, seq = Transcript(), [], 0
     for n, (direction, message, new) in enumerate(parts):
-        code, payload = wire.pack(message)
         seq += direction == "tx" and new
         numbers = (seq, 0) if direction == "tx" else (n + 1, seq)
-        frame = Frame(code, *numbers, payload)
-        records = transcript.feed(direction, 1000 * n, encode(frame))
+        records = transcript.feed(direction, 1000 * n, framed(message, *numbers))
         found += [record for record in records if isinstance(record, ClockSample | Pulse)]
     return found
 

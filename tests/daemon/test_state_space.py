@@ -43,7 +43,7 @@ def rigged(folder, monkeypatch):
         yield box
     finally:
         if box.worker is not None:
-            box.die()
+            box.kill()
 
 
 @contextmanager
@@ -293,9 +293,7 @@ def test_what_fails_is_in_the_state_before_it_is_answered(box):
     seen = []
     box.arm()
 
-    def fail(_):
-        raise SessionError("the disk is full", "make room")
-
+    fail = Mock(side_effect=SessionError("the disk is full", "make room"))
     outcome = box.worker.submit(fail, "A")
     outcome.add_done_callback(lambda _: seen.append(box.worker.published.get("error")["message"]))
     box.turned()
