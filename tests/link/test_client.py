@@ -23,7 +23,7 @@ from rig.reasons import make_reason
 from rig.records import ClockSample
 from sim.clock import VirtualClock
 from tests.daemon.far_port import FarPort
-from tests.flash.pty_board import PtyBoard, silent_port
+from tests.flash.pty_board import PtyBoard
 from tests.link.bench import LABEL, ScriptedLab, falling_rods
 from tests.link.strategies import MESSAGES
 from tests.link.talk import arm, connected, framed
@@ -387,13 +387,6 @@ def test_a_real_port_has_the_computer_s_clock():
     port.close()
     open_port("loop://").close()
     assert serial.protocol_handler_packages.count("sim") == 1
-
-
-def test_a_port_belongs_to_one_program():
-    with silent_port() as path:
-        first = open_port(path)
-        refused(DeviceError, "another program uses it", open_port, path)
-        first.close()
 
 
 @cases
