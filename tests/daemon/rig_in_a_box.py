@@ -257,8 +257,6 @@ class Box:
                 self.asked(lambda c, job=job: c.log_state(*job, RunState.ACCEPTED))
 
     def stop(self):
-        if self.worker is None:
-            return
         outcome = self.worker.stop("a client")
         self.turned()
         if outcome.done() and self.worker is not None and self.worker._trouble is None:
@@ -279,10 +277,9 @@ class Box:
 
     def other(self):
         """Have another client take over, when it may."""
-        if self.worker is not None:
-            with suppress(RigError):
-                self.lease.take("B", "B")
-                self.turned()
+        with suppress(RigError):
+            self.lease.take("B", "B")
+            self.turned()
 
     def reset(self):
         self.board.reset(self.clock.now_ns())
