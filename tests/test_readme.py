@@ -114,7 +114,11 @@ def test_every_command_works_in_an_installed_wheel(page, reader, installed):
     follows = page.name == "tutorial.md"  # what docs/python.md begins with
     carry_out(reader, installed, *runnable(page), *[OTHER] * follows)
     if follows:
-        assert_python_works(reader, installed)
+        (reader / "page.py").write_text("\n".join(commands(ROOT / "docs/python.md", "python")))
+        said = carry_out(reader, installed, "python page.py")
+        assert r"\begin{tabular}" in said
+        assert r"\pm" in said
+        assert (reader / "separation.svg").is_file()
 
 
 def test_each_reason_not_to_run_a_command_is_needed():
@@ -133,14 +137,6 @@ def test_every_command_of_the_choice_works(tmp_path, installed):
 
 def test_readme_begins_with_the_choice_that_new_shows():
     assert CHOICE in (ROOT / "README.md").read_text("utf-8")
-
-
-def assert_python_works(folder, installed):
-    (folder / "page.py").write_text("\n".join(commands(ROOT / "docs/python.md", "python")))
-    said = carry_out(folder, installed, "python page.py")
-    assert r"\begin{tabular}" in said
-    assert r"\pm" in said
-    assert (folder / "separation.svg").is_file()
 
 
 def test_the_teachers_page_has_few_new_words():

@@ -176,11 +176,12 @@ def test_other_versions_may_differ_in_the_last_digits(files, call, tmp_path):
     assert "9 digits agree" in call("verify", other).out
 
 
-def no_bundle(kind, folder, whole):
-    path, data = folder / "made.eln", whole.read_bytes()
+@cases
+def test_what_is_no_bundle_is_refused_in_words(kind, said, bundle, call, tmp_path):
+    path, data = tmp_path / "made.eln", bundle.read_bytes()
     if kind == "folder":
-        return folder
-    if kind == "cut":
+        path = tmp_path
+    elif kind == "cut":
         path.write_bytes(data[:1000])
     elif kind == "misled":  # where its directory begins: files are then looked for elsewhere
         path.write_bytes(data[:-6] + b"\1" * 4 + bytes(2))
@@ -188,12 +189,6 @@ def no_bundle(kind, folder, whole):
         name, how = ("a", zipfile.ZIP_DEFLATED) if kind == "packed" else ("../../a", 0)
         with zipfile.ZipFile(path, "w", how) as made:
             made.writestr(f"record/{name}", bytes(10**6))
-    return path
-
-
-@cases
-def test_what_is_no_bundle_is_refused_in_words(kind, said, bundle, call, tmp_path):
-    path = no_bundle(kind, tmp_path, bundle)
     done = call("verify", path, code=2)
     assert str(path) in done.err
     assert "hint: " in done.err

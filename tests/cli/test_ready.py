@@ -38,10 +38,7 @@ def test_a_file_in_the_folder_wins(folder):
         assert find_protocol(other) == other
 
 
-@pytest.mark.parametrize(
-    ("paths", "sentence"),
-    [((), "no board found"), (("/dev/a", "/dev/b"), "boards are at /dev/a and /dev/b")],
-)
+@cases
 def test_no_board_and_several_are_said(folder, monkeypatch, call, paths, sentence):
     plug(monkeypatch, *paths)
     done = call("run", "falling-ball", "--port", "auto", "--session", "s", code=4)

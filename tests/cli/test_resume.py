@@ -27,23 +27,19 @@ from tests.waiting import PATIENCE_S, until
 
 def stopped(arguments, session, number, wait_s):
     """Start a campaign, and send it a signal some time after it has begun."""
-    process = subprocess.Popen(
+    lock = session.with_name(session.name + ".lock")
+    with subprocess.Popen(
         lab.command(*arguments), cwd=lab.ROOT, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
         stderr=subprocess.PIPE, text=True,
-    )  # fmt: skip
-    lock = session.with_name(session.name + ".lock")
-    try:
-        until(
-            lambda: process.poll() is not None or (_holds(lock, process.pid) and session.exists())
-        )
-        time.sleep(wait_s)
-        process.send_signal(number)
-        _, err = process.communicate(timeout=PATIENCE_S)
-    finally:
-        process.kill()
-        process.wait()
-        for stream in (process.stdout, process.stderr):
-            stream.close()
+    ) as process:  # fmt: skip
+        try:
+            until(lambda: process.poll() is not None or _holds(lock, process.pid))
+            until(lambda: process.poll() is not None or session.exists())
+            time.sleep(wait_s)
+            process.send_signal(number)
+            _, err = process.communicate(timeout=PATIENCE_S)
+        finally:
+            process.kill()
     assert "Traceback" not in err, err
     return process.returncode, err
 

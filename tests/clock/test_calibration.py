@@ -10,10 +10,10 @@ from rig.clock.host import TOLERANCE_NS, HostClocks, HostWatch, read_clocks
 from rig.clock.rate import ping_rate, pulse_rate
 from rig.clock.samples import SEND, one_axis, samples
 from rig.link import messages as wire
-from rig.link.frames import Frame, encode
 from rig.link.transcript import Transcript
 from rig.records import ClockSample, HostBreak, Pulse
 from tests.clock.clocks import HZ, Clock, compared, moved, ppm, seconds
+from tests.link.talk import framed
 
 S = 10**9
 
@@ -32,8 +32,7 @@ def test_a_sleeping_host_spoils_nothing(slept):
     told = one_axis(samples(before + after), breaks=[HostBreak(99 * S, round(slept * S), 0)])
     rate = rate_of(told)
     assert abs(ppm(rate.hz, -1300e-6)) < 3.0
-    assert rate.n == len(before) + len(after)
-    assert rate.span_s == pytest.approx(120, abs=2)
+    assert (rate.n, rate.span_s) == (len(before) + len(after), pytest.approx(120, abs=2))
     assert told.pings[-1, SEND] == after[-1].host_send_ns + round(slept * S)
     if slept == 0.7:  # untold it does show, as a jump or as a rate off by 7 %
         untold = rate_of(one_axis(samples(before + after)))
@@ -149,8 +148,7 @@ def test_a_missed_pulse_and_one_too_many_begin_new_stretches():
     surplus = [p if n < 30 else p._replace(number=p.number + 1) for n, p in enumerate(pulses)]
     for wrong in (missed, surplus):
         rate = measured(clock, wrong)
-        assert rate.n == 60
-        assert rate.span_s == pytest.approx(58.0, abs=0.1)
+        assert (rate.n, rate.span_s) == (60, pytest.approx(58.0, abs=0.1))
         assert abs(ppm(rate.hz, -1300e-6)) < 5e-3
 
 
@@ -175,8 +173,7 @@ def test_a_restart_of_the_board_begins_a_new_stretch():
     pings = compared(one, 1, 60.0) + compared(two, 2, 60.0, begin=70.0)
     pulses = seconds(one, 5, 50) + seconds(two, 75, 50)
     rate = measured(one, pulses, pings)
-    assert rate.n == 100
-    assert rate.span_s == pytest.approx(98.0, abs=0.1)
+    assert (rate.n, rate.span_s) == (100, pytest.approx(98.0, abs=0.1))
     assert abs(ppm(rate.hz, -1300e-6)) < 5e-3
 
 
@@ -184,11 +181,9 @@ def talk(*parts):
     """Feed messages in turn; requests have seq 1, 2, …."""
     transcript, found, seq = Transcript(), [], 0
     for n, (direction, message, new) in enumerate(parts):
-        code, payload = wire.pack(message)
         seq += direction == "tx" and new
         numbers = (seq, 0) if direction == "tx" else (n + 1, seq)
-        frame = Frame(code, *numbers, payload)
-        records = transcript.feed(direction, 1000 * n, encode(frame))
+        records = transcript.feed(direction, 1000 * n, framed(message, *numbers))
         found += [record for record in records if isinstance(record, ClockSample | Pulse)]
     return found
 

@@ -189,9 +189,9 @@ class Box:
                 self.worker._turn(self.worker._jobs.get_nowait())
             self.worker._turn(None)
         except KilledError:
-            self.die()
+            self.kill()
 
-    def die(self):
+    def kill(self):
         """End the daemon as ``kill -9`` does; what the kernel has of it goes its way."""
         self.clock.sleep(0.02)
         self.board.advance(self.clock.now_ns())
@@ -257,8 +257,6 @@ class Box:
                 self.asked(lambda c, job=job: c.log_state(*job, RunState.ACCEPTED))
 
     def stop(self):
-        if self.worker is None:
-            return
         outcome = self.worker.stop("a client")
         self.turned()
         if outcome.done() and self.worker is not None and self.worker._trouble is None:
@@ -279,18 +277,13 @@ class Box:
 
     def other(self):
         """Have another client take over, when it may."""
-        if self.worker is not None:
-            with suppress(RigError):
-                self.lease.take("B", "B")
-                self.turned()
+        with suppress(RigError):
+            self.lease.take("B", "B")
+            self.turned()
 
     def reset(self):
         self.board.reset(self.clock.now_ns())
         self.turned() if self.worker is not None else None
-
-    def kill(self):
-        """Kill the daemon between two of its turns."""
-        self.die()
 
     def pull(self):
         """Pull the cable and put it back: the open port is gone, and can be opened again."""

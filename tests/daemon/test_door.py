@@ -29,17 +29,6 @@ def processes(state):
         yield made
 
 
-def drop_once(processes):
-    """Have a drop recorded by a client that goes."""
-    client = processes.client()
-    client.take_control()
-    client.open_session(str(processes.protocol), str(processes.session))
-    attempt = let_fall(lambda work: work(client))
-    client.collect(1, attempt)
-    client.close()
-    return attempt
-
-
 def delete(place):
     shutil.rmtree(place.parent)
 
@@ -81,7 +70,12 @@ def test_it_stays_for_the_clients_that_it_has(processes):
 
 def test_where_all_was_deleted_under_it_it_saves_what_it_has_and_ends(processes, state):
     processes.start_daemon("--idle-timeout", "300")
-    attempt = drop_once(processes)
+    client = processes.client()
+    client.take_control()
+    client.open_session(str(processes.protocol), str(processes.session))
+    attempt = let_fall(lambda work: work(client))
+    client.collect(1, attempt)
+    client.close()
     for path in processes.folder.glob("session*"):
         path.unlink()
     elsewhere = processes.folder.rename(processes.folder.with_name(f"gone-{os.getpid()}"))

@@ -90,13 +90,6 @@ def test_a_line_nested_without_end_is_no_request():
     assert rpc.read_line(b"[" * 5000).code == rpc.PARSE
 
 
-def test_a_request_is_read_as_it_was_written():
-    job = {"run": 1, "attempt": 2}
-    assert rpc.read_line(rpc.request("arm", job, 5)) == rpc.Request(
-        jsonrpc="2.0", method="arm", params=job, id=5
-    )
-
-
 @cases
 def test_who_is_no_daemon_is_told_so(tmp_path, told, why):
     tmp_path.chmod(0o700)

@@ -17,6 +17,7 @@ from tests.daemon.at_work import let_fall, working
 from tests.daemon.far_port import FarPort
 from tests.flash.pty_board import info
 from tests.refusals import refused
+from tests.tables import cases
 from tests.waiting import until
 
 
@@ -51,10 +52,7 @@ def test_a_board_is_found_at_another_port_with_the_drop_it_holds(usb):
         assert ports == [(str(processes.port), "85430"), (os.path.realpath(elsewhere), "85430")]
 
 
-@pytest.mark.parametrize(
-    ("numbers", "other_by"),
-    [(("85430", "999"), "number 999, not 85430"), ((None, None), "id "), (("85430",) * 2, "id ")],
-)
+@cases
 def test_another_board_where_it_was_is_not_taken_for_it(usb, numbers, other_by):
     with ProcessFixture(1, seed=1) as processes, ProcessFixture(1, seed=2) as other:
         usb |= {processes.port: numbers[0]}

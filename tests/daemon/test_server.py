@@ -294,10 +294,7 @@ async def test_whatever_a_client_is_called_all_see_it(door):
 
 
 async def test_a_part_that_dies_ends_the_daemon_and_says_so(door, monkeypatch, caplog):
-
-    def broken():
-        raise ArithmeticError("of a kind that nobody foresaw")
-
+    broken = Mock(side_effect=ArithmeticError("of a kind that nobody foresaw"))
     monkeypatch.setattr(door.server.service.publisher, "spread", broken)
     door.server.published.set(error={"message": "anything"})
     with pytest.raises(ArithmeticError, match="nobody foresaw"):
@@ -306,11 +303,7 @@ async def test_a_part_that_dies_ends_the_daemon_and_says_so(door, monkeypatch, c
 
 
 async def test_a_worker_that_dies_ends_the_daemon(door, monkeypatch, caplog):
-
-    def broken():
-        raise SystemError
-
-    monkeypatch.setattr(door.server._worker, "_attend", broken)
+    monkeypatch.setattr(door.server._worker, "_attend", Mock(side_effect=SystemError))
     door.server._worker.wake()
     waiting = door.server._worker.submit(lambda _: None, None)
     with pytest.raises(SystemError):
@@ -342,11 +335,7 @@ async def test_a_stop_is_read_behind_any_number_of_requests(door, monkeypatch):
 
 
 async def test_a_stop_waits_for_no_more_than_what_is_being_answered(door, monkeypatch):
-    lines = [await asyncio.open_unix_connection(door.path) for _ in range(21)]
-    for _, writer in lines:
-        writer.write(HELLO)
-    while door.server.published.get("clients") < len(lines):
-        await asyncio.sleep(0)
+    lines = [await greeted(door.path) for _ in range(21)]
     (_, stopping), *many = lines
     done, do = [], door.server.service.do
 

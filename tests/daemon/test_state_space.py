@@ -16,10 +16,11 @@ import pytest
 
 from rig.daemon.worker import STALL_S
 from rig.errors import ControlError, SessionError, StoppedError
-from rig.link.messages import TEST_RUN, Arm, Phase, RefusalReason, pack_label
+from rig.link.messages import TEST_RUN, Phase, RefusalReason, pack_label
 from rig.recorder.controller import Controller
 from rig.recorder.published import PublishedState
 from tests.daemon.rig_in_a_box import Box, Trouble
+from tests.link.talk import arm
 from tests.session.altering import alter
 from tests.tables import read_table
 
@@ -43,7 +44,7 @@ def rigged(folder, monkeypatch):
         yield box
     finally:
         if box.worker is not None:
-            box.die()
+            box.kill()
 
 
 @contextmanager
@@ -112,6 +113,15 @@ def test_whatever_goes_wrong_at_any_moment_of_a_drop_it_ends_well(
 def test_nothing_falls_unarmed_is_lost_or_waits_for_ever(folder, monkeypatch):
     found = explored(ACTIONS, 3, folder, monkeypatch)
     assert any(path[-1:] == (("accept", None),) for path in found.values())
+
+
+def seen_at_answer(box, work, look, **options):
+    """Have a client ask for work; its outcome, and what there is to see when that is known."""
+    seen = []
+    outcome = box.worker.submit(work, "A", **options)
+    outcome.add_done_callback(lambda _: seen.append(look()))
+    box.turned()
+    return outcome, *seen
 
 
 @pytest.fixture
@@ -243,8 +253,7 @@ def test_what_was_heard_of_a_port_that_is_gone_is_on_the_disk(box):
 def test_what_a_test_of_the_release_left_on_the_board_is_in_nobodys_way(box):
     box.board.lab.drop = lambda _label: []
     device, label = box.worker.controller.recorder.device, pack_label(TEST_RUN, 1)
-    order = {"gates": 3, "release": 1, "pulse_us": 80_000, "timeout_ms": 1000, "record_ms": 180}
-    device.fire(device.arm(Arm(label, **order)))
+    device.fire(arm(device, label, gates=3))
     box.clock.sleep(1.0)
     assert box.phase is Phase.HOLDING
     box.kill()
@@ -290,16 +299,10 @@ def test_who_is_held_up_says_by_what_and_whether_anything_is_armed(box, monkeypa
 
 
 def test_what_fails_is_in_the_state_before_it_is_answered(box):
-    seen = []
     box.arm()
-
-    def fail(_):
-        raise SessionError("the disk is full", "make room")
-
-    outcome = box.worker.submit(fail, "A")
-    outcome.add_done_callback(lambda _: seen.append(box.worker.published.get("error")["message"]))
-    box.turned()
-    assert seen == ["the disk is full"]
+    fail = Mock(side_effect=SessionError("the disk is full", "make room"))
+    _, error = seen_at_answer(box, fail, lambda: box.worker.published.get("error"))
+    assert error["message"] == "the disk is full"
     assert box.board._controller.phase is not Phase.ARMED, "what cannot be kept must not fall"
 
 
@@ -339,25 +342,20 @@ def test_stop_answers_what_waits(box):
 
 
 def test_a_session_that_is_opened_ends_the_trouble_of_the_one_before(box):
-    seen = []
     names = str(box.protocol), str(box.session)
     box.worker._weigh(SessionError("the disk is full", "make room"))
-    outcome = box.worker.submit(lambda c: c.open_session(*names), "A", writes=False)
-    outcome.add_done_callback(lambda _: seen.append(box.worker._trouble))
-    box.turned()
-    assert seen == [None], "before it is answered"
+    work, look = lambda c: c.open_session(*names), lambda: box.worker._trouble
+    assert seen_at_answer(box, work, look, writes=False)[1] is None, "before it is answered"
 
 
 def test_stop_ends_the_search_for_a_board_that_does_not_answer(box):
     box.worker.controller.disconnect()
     box.trouble = Trouble("stopped", "write", 2)
     box.deaf_until_ns = box.clock.now_ns() + 60 * 10**9
-    begun_s, ended_s = box.now(), []
-    outcome = box.worker.submit(lambda c: c.connect(), "A")
-    outcome.add_done_callback(lambda _: ended_s.append(box.now()))
-    box.turned()
+    begun_s = box.now()
+    outcome, ended_s = seen_at_answer(box, lambda c: c.connect(), box.now)
     assert isinstance(outcome.exception(), StoppedError)
-    assert ended_s[0] - begun_s < 3.0
+    assert ended_s - begun_s < 3.0
 
 
 @pytest.mark.slow

@@ -8,12 +8,12 @@ from types import SimpleNamespace
 from rig.daemon.lease import Lease
 from rig.daemon.worker import Worker
 from rig.errors import DeviceTimeoutError
-from rig.link.frames import Frame, encode
-from rig.link.messages import CODES, Abort, Disarmed, DisarmReason, Done, Phase, pack
+from rig.link.messages import CODES, Abort, Disarmed, DisarmReason, Done, Phase
 from rig.recorder.controller import Controller
 from rig.recorder.published import PublishedState
 from rig.session.schema import RunState
 from tests.cli.lab import drops_of, frames_of
+from tests.link.talk import framed
 from tests.waiting import PATIENCE_S, until
 
 
@@ -73,8 +73,8 @@ def test_a_board_that_disarms_itself_as_soon_as_it_is_armed_is_heard(tmp_path, m
     controller = Controller("sim://", PublishedState())
     ball = Path(__file__).parents[2] / "protocols/falling-ball.yaml"
     controller.open_session(str(ball), str(tmp_path / "a.session"), 1)
-    device, (code, payload) = controller.recorder.device, pack(Disarmed(1, DisarmReason.STOPPED))
-    line = encode(Frame(code, 1, 0, payload))  # read together with ARMED
+    device = controller.recorder.device
+    line = framed(Disarmed(1, DisarmReason.STOPPED))  # read together with ARMED
     monkeypatch.setattr(device, "arm", lambda _: len(device._feed("rx", 0, line)))
     controller.arm(1, 1)
     controller.notice()

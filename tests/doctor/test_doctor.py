@@ -166,16 +166,14 @@ def verdicts(port):
     return [(finding.what, finding.advice) for finding in findings]
 
 
-@pytest.mark.parametrize(
-    ("words", "advises"), [(b"screen", "close that program"), (b"rig daemon", "let that daemon")]
-)
+@cases
 def test_who_has_a_port_open(words, advises, terminal, process):
     process(7, [b"sleep"], "/dev/null")
     process(os.getpid(), [b"this"], terminal)
-    process(4711, [words, terminal.encode()], "/dev/null", terminal)
+    process(4711, [words.encode(), terminal.encode()], "/dev/null", terminal)
     permission, owners, modem = verdicts(terminal)
     assert permission == ("given", "")
-    assert owners[0] == f"{words.decode()} {terminal} (process 4711)"
+    assert owners[0] == f"{words} {terminal} (process 4711)"
     assert advises in owners[1]
     assert modem == ("it does not run", "")
 

@@ -4,7 +4,7 @@ import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
 from rig.link import messages as wire
-from rig.link.frames import Decoder, Frame, encode
+from rig.link.frames import Decoder
 from rig.protocol import reader
 from rig_emulator import trials
 from rig_emulator.avr import Avr
@@ -18,7 +18,7 @@ from sim.lab import ChainLab
 from tests.firmware.toolchain import FIRMWARE, make
 from tests.link.bench import LABEL, Bench
 from tests.link.conformance import DeviceConformance
-from tests.link.talk import Wire, arm
+from tests.link.talk import Wire, arm, framed
 
 _TURN_TICKS = 1 << 16
 
@@ -241,8 +241,7 @@ def test_pins_that_nothing_drives_are_blocked_gates(name):
     avr.edge(0, wiring.gates[3], False)
     avr.run(500_000)
     avr.take_sent()
-    code, payload = wire.pack(wire.Status())
-    avr.receive(encode(Frame(code, 1, 0, payload)))
+    avr.receive(framed(wire.Status()))
     avr.run(700_000)
     (frame,) = Decoder().feed(bytes(sent.value for sent in avr.take_sent()))
     every = (1 << len(wiring.gates)) - 1

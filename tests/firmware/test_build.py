@@ -101,8 +101,10 @@ EACH = pytest.mark.parametrize("target", TARGETS.values(), ids=TARGETS)
 COMPILERS = {"avr-gcc": "PREBUILT_WITH", "arm-none-eabi-gcc": "PICO_PREBUILT_WITH"}
 
 
-def built_in(folder):
-    """Copy the sources there, build them, and say where the images are."""
+@pytest.fixture(scope="module")
+def images(tmp_path_factory):
+    """Copy the sources, build them, and say where the images are."""
+    folder = tmp_path_factory.mktemp("prebuilt") / "another name" / "much deeper"
     need("make", *COMPILERS, "avr-objcopy")
     makefile = (FIRMWARE / "Makefile").read_text()
     for compiler, name in COMPILERS.items():
@@ -118,11 +120,6 @@ def built_in(folder):
         copy(FIRMWARE / name, firmware / name)
     run_program("make", "-C", firmware, "prebuilt", timeout=None)
     return images
-
-
-@pytest.fixture(scope="module")
-def images(tmp_path_factory):
-    return built_in(tmp_path_factory.mktemp("prebuilt") / "another name" / "much deeper")
 
 
 @EACH

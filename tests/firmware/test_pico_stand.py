@@ -10,12 +10,13 @@ import pytest
 
 import tests.firmware.emulated  # noqa: F401 - first: it knows what to say when there is none
 from rig.link import messages as wire
-from rig.link.frames import Decoder, Frame, encode
+from rig.link.frames import Decoder
 from rig_emulator.pico_chip import PicoChip
 from rig_emulator.stand import Flip, Stand
 from rig_emulator.usb_bench import soak
 from rig_emulator.wiring import PICO
 from tests.firmware.pico import build, symbol
+from tests.link.talk import framed
 
 US = 120
 MS = 1000 * US
@@ -189,9 +190,8 @@ def test_what_nobody_reads_disarms_no_later(stand):
     order = wire.Arm(wire.pack_label(1, 1), 1, 1, 4_000, 2, 5)
     stand.ask(order, 4000)
     chip.reads(False)
-    code, payload = wire.pack(wire.Status())
     for seq in range(100, 160):
-        chip.receive(encode(Frame(code, seq, 0, payload)))
+        chip.receive(framed(wire.Status(), seq))
     chip.run(chip.cycle + 3 * MS)
     assert chip.take_sent() == []
     assert chip.peek(symbol("phase"), 1) == bytes([wire.Phase.IDLE])

@@ -60,19 +60,15 @@ def test_avrdude_fails(says, message, avrdude, flash):
         assert words in done.err
 
 
-def broken_program(folder):
-    program = folder / "broken"
-    program.write_bytes(b"#!/nowhere/at-all\n")
-    program.chmod(0o755)
-    return program
-
-
 @cases
 def test_nothing_is_flashed_where_something_is_wrong(
     arguments, code, message, avrdude, flash, tmp_path
 ):
+    program = tmp_path / "broken"
+    program.write_bytes(b"#!/nowhere/at-all\n")
+    program.chmod(0o755)
     with silent_port() as path:
-        places = {"SILENT": path, "BROKEN": broken_program(tmp_path), "UNO": UNO.image_path}
+        places = {"SILENT": path, "BROKEN": program, "UNO": UNO.image_path}
         done = flash(*(places.get(word, word) for word in arguments), code=code)
     assert message in done.err
     assert not avrdude.noted.exists()

@@ -36,6 +36,12 @@ def order(**changes: int) -> wire.Arm:
     return wire.Arm(**({"label": LABEL} | ORDER | changes))
 
 
+def framed(message: wire.Message, seq: int = 1, ack: int = 0) -> bytes:
+    """Write a message as it goes over the line."""
+    code, payload = wire.pack(message)
+    return encode(Frame(code, seq, ack, payload))
+
+
 def url(scheme: str, protocol: Path = FENCE, **settings: object) -> str:
     """Write the URL of a simulated or an emulated board, every value escaped."""
     said = {"protocol": str(protocol), **settings}

@@ -23,10 +23,10 @@ from rig.reasons import make_reason
 from rig.records import ClockSample
 from sim.clock import VirtualClock
 from tests.daemon.far_port import FarPort
-from tests.flash.pty_board import PtyBoard, silent_port
+from tests.flash.pty_board import PtyBoard
 from tests.link.bench import LABEL, ScriptedLab, falling_rods
 from tests.link.strategies import MESSAGES
-from tests.link.talk import arm, connected
+from tests.link.talk import arm, connected, framed
 from tests.refusals import refused
 from tests.tables import cases
 from tests.waiting import until
@@ -61,18 +61,13 @@ class FakePort:
             if answer is None:
                 raise serial.SerialException("device reports readiness to read but is gone")
             for message in answer:
-                code, payload = wire.pack(message)
-                self.out += encode(Frame(code, 1, frame.seq, payload))
+                self.out += framed(message, ack=frame.seq)
         return len(data)
 
 
 @pytest.fixture
 def clock() -> VirtualClock:
     return VirtualClock()
-
-
-def device(clock: VirtualClock, answers: dict) -> Device:
-    return Device(FakePort(clock, answers), clock)
 
 
 IDENTITY = wire.Identity(
@@ -95,18 +90,13 @@ class Captive(FakePort):
         if self.freed_ns and self.clock.now_ns() >= self.freed_ns:
             self.freed_ns = 0
             self.answers = {wire.Identify: [IDENTITY]}
-            self.out = b"\0" + encode(Frame(*_with(wire.Boot(0))))
+            self.out = b"\0" + framed(wire.Boot(0))
         return super().read(size)
 
     def write(self, data):
         if not self.answers:
             self.freed_ns = self.clock.now_ns() + 5 * 10**9
         return super().write(data)
-
-
-def _with(message):
-    code, payload = wire.pack(message)
-    return code, 1, 0, payload
 
 
 def test_a_boot_loader_is_left_in_peace_until_it_lets_go(clock):
@@ -176,8 +166,8 @@ def test_seq_wraps_around_zero(clock):
 
 
 def test_nonsense_is_said_to_be_nonsense(clock):
-    confused = device(clock, {wire.Status: [wire.Pong(1)]})
-    refused(DeviceError, "answered Status with Pong", confused.status)
+    port = FakePort(clock, {wire.Status: [wire.Pong(1)]})
+    refused(DeviceError, "answered Status with Pong", Device(port, clock).status)
 
 
 @pytest.mark.parametrize("ask", [Device.status, Device.receive, Device.statistics])
@@ -284,7 +274,8 @@ def test_after_an_abort_the_certificate_is_asked_for_soon(clock):
         wire.Status: [wire.State(wire.Phase.HOLDING, 0, 1, 0)],
         wire.Read: [certificate(1, 0)],
     }
-    drop = device(clock, answers).collect(1, timeout=60, stop=lambda: True)
+    port = FakePort(clock, answers)
+    drop = Device(port, clock).collect(1, timeout=60, stop=lambda: True)
     assert drop.certificate.events == 0
     assert 0.25 <= clock.now_ns() * 1e-9 < 0.4
 
@@ -293,8 +284,7 @@ def test_after_an_abort_the_certificate_is_asked_for_soon(clock):
 
 
 def say(transcript: Transcript, direction, message, *, seq=0, ack=0, ns=0) -> list:
-    code, payload = wire.pack(message)
-    return transcript.feed(direction, ns, encode(Frame(code, seq, ack, payload)))
+    return transcript.feed(direction, ns, framed(message, seq, ack))
 
 
 def heard(*messages) -> Transcript:
@@ -350,8 +340,7 @@ def test_arming_again_begins_anew_but_a_repeated_answer_does_not():
 
 def test_half_a_frame_before_a_reconnect_swallows_nothing():
     transcript = Transcript()
-    code, payload = wire.pack(certificate(1, 0))
-    transcript.feed("rx", 0, encode(Frame(code, 1, 0, payload))[:9])
+    transcript.feed("rx", 0, framed(certificate(1, 0))[:9])
     transcript.feed("tx", 1, b"\0")
     assert say(transcript, "rx", IDENTITY, ack=1) == [Incoming(0, 1, IDENTITY)]
 
@@ -398,13 +387,6 @@ def test_a_real_port_has_the_computer_s_clock():
     port.close()
     open_port("loop://").close()
     assert serial.protocol_handler_packages.count("sim") == 1
-
-
-def test_a_port_belongs_to_one_program():
-    with silent_port() as path:
-        first = open_port(path)
-        refused(DeviceError, "another program uses it", open_port, path)
-        first.close()
 
 
 @cases

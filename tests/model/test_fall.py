@@ -182,15 +182,11 @@ def end(chain, alpha, gamma, drop, gravity, speed=0.0):
     return found.separation_m, found.speed_m_s, found.time_s
 
 
-def falls_of(chain, rows):
-    alpha, gamma, drop, gravity, speed = map(np.array, zip(*rows, strict=True))
-    return falls(chain.masses, chain.heights, given_impacts(alpha, gamma), drop, gravity, speed)
-
-
 @examples(150)
 @given(chains(), ONE_OR_MANY)
 def test_one_chain_falls_as_it_does_alone(chain, rows):
-    found = falls_of(chain, rows)
+    alpha, gamma, drop, gravity, speed = map(np.array, zip(*rows, strict=True))
+    found = falls(chain.masses, chain.heights, given_impacts(alpha, gamma), drop, gravity, speed)
     assert ends(found) == [end(chain, *row) for row in rows]
 
 

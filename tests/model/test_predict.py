@@ -120,9 +120,7 @@ def test_a_pile_has_its_own_restitution_and_no_friction():
     assert (found.model, level.model) == ("discrete, pile", "discrete")
 
 
-@pytest.mark.parametrize(
-    ("alpha", "note"), [(-0.01, "negative"), (0.0, None), (0.5, None), (0.51, "above ½")]
-)
+@cases
 def test_outside_the_domain_a_prediction_says_so_and_is_still_given(alpha, note):
     found = predict(replace(CHAIN, alpha=Quantity(alpha)), SURFACE, 40.0, DROP, GRAVITY)
     assert (found.in_domain, len(found.notes)) == (note is None, int(note is not None))

@@ -37,9 +37,7 @@ def planned(**changes):
     return runs(dataclasses.replace(protocol, plan=plan))
 
 
-@pytest.mark.parametrize(
-    ("order", "impact"), [("ABBA", "ABBAAB"), ("alternate", "ABABAB"), ("fixed", "AAAAAA")]
-)
+@cases
 def test_order_within_each_incline(order, impact):
     made = planned(inclines=(10.0, 40.0), repeats=6, order=order)
     assert "".join(run.impact for run in made) == impact * 2

@@ -179,10 +179,12 @@ def logged(dead, tmp_path):
 
 
 def test_what_is_in_the_log_only_is_read_and_left_there(logged):
+    """Beside a lock that its dead writer left."""
     path, log = logged
     before = path.read_bytes(), log.read_bytes()
     found = examine(path)
     assert found.whole
+    assert found.snapshot.writer == ""
     assert [one.drop.run for one in found.drops] == list(range(1, 30))
     assert any("pages are in the log beside it" in line for line in describe(found))
     assert (path.read_bytes(), log.read_bytes()) == before
@@ -234,11 +236,6 @@ def test_a_session_that_is_being_written(tmp_path):
     assert found.whole
     assert len(found.drops) == 29
     assert any(f"being written by process {writer.pid}" in line for line in said)
-
-
-def test_a_lock_that_a_dead_process_left_says_nothing(copy):
-    copy.with_name(copy.name + ".lock").write_text("4711\n")
-    assert examine(copy).snapshot.writer == ""
 
 
 def test_a_file_that_may_only_be_read(copy, monkeypatch):

@@ -56,9 +56,8 @@ def figures() -> list[Chart]:
 
 
 @pytest.mark.parametrize("figure", figures(), ids=lambda figure: figure.title)
-@pytest.mark.parametrize("kind", ["slim", "wide"])
-def test_a_figure_is_drawn_whole(figure, kind):
-    width = {"slim": COLUMN_PT, "wide": WIDE_PT}[kind]
+@pytest.mark.parametrize(("kind", "width"), [("slim", COLUMN_PT), ("wide", WIDE_PT)])
+def test_a_figure_is_drawn_whole(figure, kind, width):
     svg = page_svg(replace(figure, simulated=True), width, kind)
     root = ET.fromstring(svg)
     assert root.get("class") == kind
@@ -222,11 +221,10 @@ def drawn(protocol):
 def test_each_ready_protocol_has_its_drawing(path):
     protocol = read(path)
     said = "".join(ET.fromstring(drawn(protocol)).itertext()).split("\n")
-    said = [words.strip() for words in said]
-    for gate in protocol.gates.gates:
-        assert f"{gate.channel}: {1e3 * gate.height:g}" in said
+    said = {words.strip() for words in said}
+    assert {f"{gate.channel}: {1e3 * gate.height:g}" for gate in protocol.gates.gates} <= said
     inclines = {incline for incline in protocol.plan.inclines if protocol.surface is not None}
-    assert {f"{incline:g}°" for incline in inclines} <= set(said)
+    assert {f"{incline:g}°" for incline in inclines} <= said
 
 
 def test_a_beam_ends_where_the_face_is_that_a_rod_lies_on():

@@ -71,7 +71,6 @@ def fewer_gates(lab, number=12):
     return board
 
 
-TIME = "it needs a computer with time to ask the board every 125 ms"
 BOARDS = {"looped": LoopedBoard, "held up": HeldUp, "stopped": Stopped, "12 gates": fewer_gates}
 
 
@@ -80,8 +79,7 @@ def test_a_right_rig_fails_nothing_and_is_told_what_it_lacks(
     board, wiring, options, says, monkeypatch
 ):
     lab = wired(**wiring)
-    controller = claims(gates=("or_", lab.hanging))
-    monkeypatch.setattr("sim.board.Microcontroller", controller)
+    monkeypatch.setattr("sim.board.Microcontroller", claims(gates=("or_", lab.hanging)))
     board = BOARDS[board](lab)
     found = outcomes(port_of(board), **options)
     assert failed(found) == []
@@ -93,7 +91,8 @@ def test_a_busy_computer_blames_no_board(monkeypatch):
     monkeypatch.setattr("rig.selftest.line_checks._ASK_S", 0.3)
     found = outcomes(port_of(LoopedBoard(wired())))
     assert failed(found) == []
-    assert found["arming times out"].what == TIME.replace("125", "250")
+    lacking = "it needs a computer with time to ask the board every 250 ms"
+    assert found["arming times out"].what == lacking
 
 
 @cases

@@ -107,8 +107,7 @@ def filled(path):
 
 
 @pytest.mark.parametrize("version", range(1, SCHEMA_VERSION))
-def test_a_file_of_an_older_format_is_read_and_continued(filled, version):
-    path = filled
+def test_a_file_of_an_older_format_is_read_and_continued(path, filled, version):
     outdate(path, version)
     lost = [name for since in (2, 4) if since > version for name in LATER[since]]
     account = replace(DEVICE_DROP.certificate, **dict.fromkeys(lost))
@@ -306,12 +305,6 @@ def test_one_writer_even_within_a_process(path):
     Session.open(path).close()
 
 
-def test_a_leftover_lock_file_blocks_nobody(path):
-    make(path).close()
-    path.with_name(path.name + ".lock").write_text("4242\n")
-    Session.open(path).close()
-
-
 def test_create_never_overwrites(path):
     path.write_text("precious")
     refused(SessionError, "already exists", make, path)
@@ -322,8 +315,10 @@ def test_create_in_a_missing_folder(tmp_path):
     refused(SessionError, "No such file", make, tmp_path / "no" / "such.rig")
 
 
-def put_there(path, kind, what):
-    """Make what is no session, or not one any more."""
+@pytest.mark.parametrize("readonly", [False, True])
+@cases
+def test_what_is_no_session(path, kind, what, words, told, readonly, call):
+    """Nothing of a session, or not one any more."""
     sql = f"{what}".format(later=SCHEMA_VERSION + 1, application=APPLICATION_ID)
     match kind:
         case "folder":
@@ -341,12 +336,6 @@ def put_there(path, kind, what):
         case "cut":
             make(path).close()
             path.write_bytes(path.read_bytes()[:5000])
-
-
-@pytest.mark.parametrize("readonly", [False, True])
-@cases
-def test_what_is_no_session(path, kind, what, words, told, readonly, call):
-    put_there(path, kind, what)
     before = path.read_bytes() if path.is_file() else None
     error = refused(SessionError, words, Session.open, path, readonly=readonly)
     assert error.hint
@@ -403,8 +392,7 @@ def test_what_is_not_as_recorded_is_named(sql, fault, sound, tmp_path):
     assert any(line.startswith("table " + fault) for line in damage), damage
 
 
-def test_an_old_file_has_no_chain_and_a_continued_one_says_since_when(filled):
-    path = filled
+def test_an_old_file_has_no_chain_and_a_continued_one_says_since_when(path, filled):
     outdate(path, 4)
     before = path.read_bytes()
     assert (faults(path), first(path), path.read_bytes()) == ([], None, before)

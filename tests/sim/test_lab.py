@@ -34,11 +34,6 @@ def exactly(value):
     return pytest.approx(float(value), rel=1e-12)
 
 
-def assert_same_edges(edges, expected) -> None:
-    assert [blocked for _, blocked in edges] == [blocked for _, blocked, _ in expected]
-    assert [t for t, _ in edges] == pytest.approx([DELAY + t for t, _, _ in expected], abs=1e-12)
-
-
 @pytest.mark.parametrize("incline", [0, 20, 30, 40, 60, 80])
 def test_every_quiet_edge_is_where_the_equations_put_it(incline):
     edges, truth = drop(UNIFORM, run=RUN_OF[incline])
@@ -51,7 +46,9 @@ def test_every_quiet_edge_is_where_the_equations_put_it(incline):
     for gate in UNIFORM.gates.gates:
         time_down = by_hand.time_down if gate.side == "impact" else free_time_down
         crossed = crossings(gate.height, time_down)
-        assert_same_edges(on(edges, gate.channel), crossed)
+        seen = on(edges, gate.channel)
+        assert [blocked for _, blocked in seen] == [blocked for _, blocked, _ in crossed]
+        assert [t for t, _ in seen] == pytest.approx([DELAY + t for t, _, _ in crossed], abs=1e-12)
         expected += len(crossed)
     assert len(edges) == expected
     assert [e[0] for e in edges] == sorted(e[0] for e in edges)

@@ -17,21 +17,17 @@ from tests.tables import cases
 ONE_INCLINE = "incline=40deg"
 
 
-def assert_provenance(facts):
-    assert facts["made_by"] == f"rig {__version__} sweep"
-    assert facts["protocol_sha256"] == hashlib.sha256(SCENE.encode()).hexdigest()
-    assert facts["fixed"] == {"drop_m": 0.18, "gravity_m_s2": 9.81}
-    assert facts["pile"] == {"below_deg": 5.0, "restitution": -0.37}
-    assert facts["free_chain_longer_m"] == pytest.approx(0.05)
-
-
 def test_csv_and_npz_say_the_same(sweep, tmp_path):
     sweep("s.csv", *VARY)
     sweep("s.npz", *VARY)
     lines = (tmp_path / "s.csv").read_text("utf-8").splitlines()
     comments = [line[2:].split(": ", 1) for line in lines if line.startswith("# ")]
     facts = {name: json.loads(text) for name, text in comments}
-    assert_provenance(facts)
+    assert facts["made_by"] == f"rig {__version__} sweep"
+    assert facts["protocol_sha256"] == hashlib.sha256(SCENE.encode()).hexdigest()
+    assert facts["fixed"] == {"drop_m": 0.18, "gravity_m_s2": 9.81}
+    assert facts["pile"] == {"below_deg": 5.0, "restitution": -0.37}
+    assert facts["free_chain_longer_m"] == pytest.approx(0.05)
     rows = list(csv.DictReader(lines[len(comments) :]))
     with np.load(tmp_path / "s.npz") as found:
         assert json.loads(found["metadata"].item()) == facts

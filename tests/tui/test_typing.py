@@ -24,7 +24,6 @@ from tests.tui.lab import KEYS, flow_of
 from tests.waiting import PATIENCE_S
 
 STILL_S = 0.15
-SIZE = (80, 24)
 MOMENTS = {name: flow_of(**row) for name, row in read_table(__file__, "moments")["typing"].items()}
 PAGE_OF = {"device": "device", "result": "result", "halted": "result", "done": "session"}
 DIALOGS = ("", "ctrl+p", "question_mark", "n", "a", "q", "c", "l")
@@ -202,22 +201,15 @@ async def test_a_key_that_comes_back_from_its_field_after_the_end_is_dropped(ses
 
 async def test_stop_is_on_its_way_within_a_tenth_of_a_second(session):
     async with _screen(session) as (app, pilot):
-        for moment in MOMENTS:
-            await _at(app, pilot, moment)
+        for moment, flow in MOMENTS.items():
+            app.driver.flow = replace(flow, ticket=app.flow.ticket + 1)
             end = time.monotonic() + PATIENCE_S
+            while app._open() and app.page != PAGE_OF.get(moment, "run"):
+                assert time.monotonic() < end, app.page
+                await pilot.pause(0.01)
+            await pilot.pause(0.12)  # it is drawn
             while (waited := await _stopped(app, pilot)) > 0.1:  # for other programs' sake
                 assert time.monotonic() < end, (moment, waited)
-
-
-async def _at(app, pilot, moment):
-    """Come to a moment, with its page shown."""
-    flow = MOMENTS[moment]
-    app.driver.flow = replace(flow, ticket=app.flow.ticket + 1)
-    end = time.monotonic() + PATIENCE_S
-    while app._open() and app.page != PAGE_OF.get(moment, "run"):
-        assert time.monotonic() < end, app.page
-        await pilot.pause(0.01)
-    await pilot.pause(0.12)  # it is drawn
 
 
 async def _stopped(app, pilot):
@@ -236,7 +228,7 @@ async def _screen(session):
     sections = {**QUIET, "session": whole.sections["session"]}
     rig = Rig(replace(whole, sections=sections))
     app = RigApp(Options(session=session, countdown_s=0.3, still_s=STILL_S), KEYS, rig)
-    async with app.run_test(size=SIZE) as pilot:
+    async with app.run_test(size=(80, 24)) as pilot:
         rig.changed = True
         while not app.page or app.follower.view is None:
             await pilot.pause(0.01)
