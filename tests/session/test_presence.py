@@ -13,10 +13,12 @@ import pytest
 from bench.mutants import make_session
 from bench.process_fixture import FENCE
 from rig.errors import DeviceError, SessionError
+from rig.files import beside
 from rig.recorder.controller import Controller
 from rig.recorder.published import PublishedState
 from rig.recover.examine import examine
 from rig.session.hashes import check_chain
+from rig.session.presence import Presence
 from rig.session.schema import RunState
 from rig.session.store import Session
 from tests.cli.lab import drops_of
@@ -205,3 +207,17 @@ def test_a_session_that_another_writes_costs_no_descriptor(tmp_path):
         held = open_files()
         refused(SessionError, "is being written by process", Session.open, session)
         assert open_files() == held
+
+
+@pytest.mark.parametrize(("of_another", "rows"), [(True, ""), (False, "rows")])
+def test_a_log_of_another_file_or_with_rows_stays(tmp_path, of_another, rows):
+    session, other = tmp_path / "s", tmp_path / "other"
+    log = beside(session, "-wal")
+    for file in (session, log, other):
+        file.touch()
+    presence = Presence(session)
+    if of_another:
+        other.replace(log)
+    log.write_text(rows)
+    presence.remove_log()
+    assert log.exists()
