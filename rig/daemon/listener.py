@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import socket
 from contextlib import suppress
+from errno import EADDRINUSE
+from os import strerror
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -43,15 +45,19 @@ class Door:
         self.listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             self._lock.acquire()
-            if path.is_socket():  # left by a killed one; any other file is the user's
-                path.unlink()
-            self.listener.bind(str(path))
+            if path.exists() and not path.is_socket():  # the user's; a killed daemon leaves sockets
+                raise FileExistsError(EADDRINUSE, strerror(EADDRINUSE))
+            # Whoever sees the socket finds it open.
+            begun = path.with_suffix(".new")
+            begun.unlink(missing_ok=True)
+            self.listener.bind(str(begun))
+            begun.chmod(0o600)
+            self.listener.listen(_BACKLOG)
+            begun.replace(path)
         except OSError as error:
             self.listener.close()
             code = "daemon_there" if isinstance(error, Timeout) else "place_unusable"
             raise rig_error(code, path=path, text=error) from error
-        path.chmod(0o600)
-        self.listener.listen(_BACKLOG)
         self.listener.setblocking(False)
         self._ours = _identity(self.path)
         self._lost = False
