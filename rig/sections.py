@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from rig.errors import RigError
+
 
 class Sections:
     """Makes the sections of one result.
@@ -36,5 +38,7 @@ class Sections:
             if any(isinstance(part, ImportError) for part in (error, error.__cause__)):
                 raise
             # A mistake in the program is to be seen for what it is.
-            why = getattr(error, "message", f"{type(error).__name__}: {error}")
+            why = f"{type(error).__name__}: {error}"
+            if isinstance(error, RigError):
+                why = error.message
             self.failed[name] = f"{name} could not be made: {' '.join(why.split())}"

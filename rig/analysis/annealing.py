@@ -127,6 +127,13 @@ class Pairing:
         is_top = due.rods == due.rods.max(initial=0)
         self.longest: Array = np.where(is_top, record.top_shadow, math.inf)
 
+    @property
+    def matchable(self) -> int:
+        """Number of edges that are matchable by gate and polarity alone."""
+        kinds = 1 + max(self.kind.max(initial=0), self.kinds.max(initial=0))
+        counts = [np.bincount(kind, minlength=kinds) for kind in (self.kind, self.kinds)]
+        return int(np.minimum(*counts).sum())
+
     @cached_property
     def pairs(self) -> tuple[Index, Index]:
         """All pairs of an observed and an expected edge of the same gate and polarity."""

@@ -20,20 +20,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rig.analysis.annealing import LEAST, MISSED
+from rig.analysis.annealing import LEAST, MISSED, Pairing
 from rig.analysis.chain_records import ChainRecord, chain_records, thin
 from rig.analysis.diagnoses import RIGHT
 from rig.analysis.faults import Fault, Premise, Suspects, faults
 from rig.analysis.fit import Fit, approach, settle
-from rig.analysis.identify import (
-    Reading,
-    held_back,
-    identify,
-    possible,
-    side_fall,
-    weigh,
-    well_read,
-)
+from rig.analysis.identify import Reading, held_back, identify, side_fall, weigh, well_read
 from rig.analysis.last_passages import APART
 from rig.analysis.score_test import scores
 from rig.analysis.unknowns import prior_air
@@ -170,7 +162,7 @@ class Explainer:
             records = self._records(self.stated)
             yield Explanation(_NEITHER, {}, sum(map(self._read_alone, records)))
             # Too few edges for any fall would only fit a chain with fewer rods.
-            if all(possible(record) >= LEAST * record.edge_count for record in records):
+            if all(Pairing(side).matchable >= LEAST * side.edge_count for side in records):
                 yield from self._by_votes([*sized, *discrete])
             return
         stated = Explanation(_NEITHER, {}, self._evidence(weigh(fit), self.stated.hz))
@@ -280,7 +272,7 @@ class Explainer:
         records, protocol = self._records(premise), premise.protocol
         scene = premise.hz, protocol.drop.value, protocol.gravity.value, prior_air(protocol)[0]
         expected = sum(side.edge_count for side in records)
-        votes = [possible(record) for record in records]
+        votes = [Pairing(record).matchable for record in records]
         for n, record in enumerate(records):
             if 2 * sum(votes) - expected < least:
                 break

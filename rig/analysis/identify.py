@@ -21,7 +21,6 @@ from rig.analysis.annealing import (
     MISSED,
     PEAKS,
     FallFit,
-    Pairing,
     SideFall,
     count_matched,
     log_density,
@@ -193,23 +192,16 @@ def well_read(fit: Fit) -> bool:
     """Whether nearly all matchable edges are matched, with usual scatter and unknowns in range."""
     records = fit.model.records.values()
     expected = sum(record.edge_count for record in records)
-    many = fit.match_count >= max(LEAST * max(1, expected), FAIR * sum(map(possible, records)))
+    matchable = sum(pairing.matchable for pairing in fit.model.pairings.values())
+    many = fit.match_count >= max(LEAST * max(1, expected), FAIR * matchable)
     strain = float(np.abs(fit.model.unknowns.pull(fit.x)).max())
     return many and fit.estimate.scatter < RESTLESS and strain < STRAY
-
-
-def possible(record: ChainRecord) -> int:
-    """Return how many edges of a side are matchable by gate and polarity alone."""
-    pairing = Pairing(record)
-    kinds = 1 + max(pairing.kind.max(initial=0), pairing.kinds.max(initial=0))
-    counts = [np.bincount(kind, minlength=kinds) for kind in (pairing.kind, pairing.kinds)]
-    return int(np.minimum(*counts).sum())
 
 
 def _read(fall: SideFall, earliest: float, batches: int | None) -> list[FallFit]:
     """Anneal batches of starts until a reading explains the edges; the likeliest first."""
     readings: list[FallFit] = []
-    least, matchable = LEAST * fall.record.edge_count, possible(fall.record)
+    least, matchable = LEAST * fall.record.edge_count, fall.pairing.matchable
     enough = max(least, _CLEAR * matchable)
     if not fall.record.edges.times.size or matchable < least:
         return readings

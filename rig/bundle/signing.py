@@ -4,7 +4,7 @@ import os
 import sys
 from collections.abc import Callable, Mapping
 from getpass import getpass
-from typing import Any
+from typing import TypeVar
 
 from minisign import Error, PublicKey, SecretKey, Signature
 
@@ -13,6 +13,7 @@ from rig.bundle.contents import WRONG
 from rig.files import read_input
 from rig.reasons import errors_become, rig_error
 
+Key = TypeVar("Key")
 _COMMENT = "rig export --bundle"
 _LONGEST = 4096
 """Bytes of a key file; minisign writes fewer than 300."""
@@ -71,7 +72,7 @@ def check_signature(files: Mapping[str, bytes], key: str | os.PathLike[str] | No
     return f"signature: right, by the key {public.to_base64().decode()} ({whose})"
 
 
-def _read_key(path: str | os.PathLike[str], read: Callable[[bytes], Any]) -> Any:
+def _read_key(path: str | os.PathLike[str], read: Callable[[bytes], Key]) -> Key:
     """Read a key file; minisign's complaints about it become ours."""
     with errors_become("key_unusable", OSError, Error, path=path):
         return read(read_input(path, _LONGEST))

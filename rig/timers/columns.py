@@ -11,7 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 from rig.text_rows import read_rows
@@ -20,6 +20,7 @@ from rig.timers.table import Row, RowBlock
 from rig.timers.timer_file import TimerFile
 from rig.timers.vocabulary import (
     POWERS,
+    facts_held,
     find_label,
     form,
     holds,
@@ -261,11 +262,6 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
     )
 
 
-def facts_held(facts: Mapping[str, object]) -> set[str]:
-    """Return what is true."""
-    return {fact for fact, is_true in facts.items() if is_true}
-
-
 def pair_columns(columns: Sequence[TimerColumn]) -> Iterator[Signal]:
     """Give each column of times what belongs to it: values of its run and input, and names."""
     counts = [column for column in columns if column.role == "index"][:1] or [ROW_COUNT]
@@ -275,20 +271,7 @@ def pair_columns(columns: Sequence[TimerColumn]) -> Iterator[Signal]:
     times = [c for c in times if c.power == finest[_part_of(c)]] or counts
     chosen = next((v for v in VALUES if any(c.role in v for c in columns)), ())
     is_sampled = chosen == SAMPLED
-    # To a value belong times of its run and gate, and of those the nearest, if possible left of it.
-    clocks = {
-        c: min(
-            times,
-            key=lambda t: (
-                bool(c.run) and t.run not in {c.run, ""},
-                not t.gate or t.gate != c.gate,
-                t.at > c.at,
-                abs(t.at - c.at),
-            ),
-        )
-        for c in columns
-        if c.role in chosen
-    }
+    clocks = {c: min(times, key=partial(_distance, c)) for c in columns if c.role in chosen}
     for clock in times:
         values = [column for column in clocks if clocks[column] is clock]
         # Without values it shares those of another run, or tells of changes by itself.
@@ -304,6 +287,13 @@ def pair_columns(columns: Sequence[TimerColumn]) -> Iterator[Signal]:
 
 def _part_of(clock: TimerColumn) -> tuple[str, str, str]:
     return clock.gate, clock.run, clock.state
+
+
+def _distance(value: TimerColumn, clock: TimerColumn) -> tuple[bool, bool, bool, int]:
+    """Return how far times are from a value: in run and gate, else by columns, nearest if left."""
+    is_other_run = bool(value.run) and clock.run not in {value.run, ""}
+    is_other_gate = not clock.gate or clock.gate != value.gate
+    return is_other_run, is_other_gate, clock.at > value.at, abs(clock.at - value.at)
 
 
 def _label_of(value: TimerColumn) -> str:

@@ -110,10 +110,10 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
             if getattr(options, name) is not None:
                 raise refusal(f"--{name.replace('_', '-')}", "own_format_stated")
         return Import(read_edges(place), {}, [f"the project's own format: {','.join(HEADER)}"], [])
-    reading, *others = _find_readings(options, gates, bars)
-    match, fitting = FallMatch(), list[Reason]()
+    readings = _find_readings(options, gates, bars)
+    reading, match, fitting = readings[0], FallMatch(), list[Reason]()
     if not options.as_read:
-        reading, match = _choose([reading, *others], place, fit)
+        reading, match = _choose(readings, place, fit)
         _refuse_impossible(reading, place)
         fitting = [make_reason("reading_chosen", option=str(reading.layout), fit=match.text)]
     file, channels = reading.file, reading.layout.channels
@@ -163,7 +163,8 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
     contradicts the file is taken only where nothing else fits nearly as well.
     """
     edges = {
-        str(x.edges[["run", "tick", "channel", "blocked"]].tolist()): x for x in reversed(readings)
+        hash((*x.edges[["run", "tick", "channel", "blocked"]].tolist(),)): x
+        for x in reversed(readings)
     }
     distinct = [*edges.values()][::-1]
     usual = [reading for reading in distinct if reading.is_whole] or distinct

@@ -17,11 +17,10 @@ import numpy as np
 from rig.arrays import Flags, Index
 from rig.records import Drop
 from rig.text_rows import read_rows
-from rig.timers.columns import facts_held
 from rig.timers.edge_rows import make_drop
 from rig.timers.moments import TICK_HZ
 from rig.timers.timer_file import STATES, Records, TimerFile
-from rig.timers.vocabulary import POWERS, holds, number_of
+from rig.timers.vocabulary import POWERS, facts_held, holds, number_of
 
 _LONGEST = 60 * TICK_HZ
 """Picoseconds: a drop lasts half a second, and nobody waits a minute until it is recorded."""

@@ -18,14 +18,14 @@ from typing import Any
 import numpy as np
 
 from rig.reasons import make_reason
-from rig.timers.columns import SAMPLED, TimerColumn, columns_of, facts_held, pair_columns, roles
+from rig.timers.columns import SAMPLED, TimerColumn, columns_of, pair_columns, roles
 from rig.timers.crossings import find_crossings
 from rig.timers.lines import is_cut, read_lines
 from rig.timers.moments import HALF_DAY, OVERFLOWS, TICK_HZ, moment
 from rig.timers.table import Row, RowBlock, Table
 from rig.timers.timer_file import CHANGE, STATES, Records, TimerFile
 from rig.timers.vcd import BEGINNINGS, vcd_rows
-from rig.timers.vocabulary import form, is_number, state_of
+from rig.timers.vocabulary import facts_held, form, is_number, state_of
 
 MAX_EVENTS = 500_000
 """Those of 600 drops of 25 rods past 16 gates; what has more is no record of drops."""

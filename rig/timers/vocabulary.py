@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from functools import cache, lru_cache
 
 from rig.text_rows import read_rows
@@ -105,19 +105,7 @@ def state_of(text: str) -> str:
     """
     word = without_accents(text[:80]).casefold()
     word = re.sub(r"(?<=[01])[.,]0{0,30}(?:e[+-]?0{1,3})?$", "", word)
-    roles = [
-        "one",
-        "zero",
-        "blocked",
-        "clear",
-        "high",
-        "low",
-        "above",
-        "below",
-        "unknown",
-        "missing",
-    ]
-    return next((role for role in roles if word in words()[role]), "")
+    return next((role for role in _STATES if word in words()[role]), "")
 
 
 def is_number(text: str) -> bool:
@@ -150,6 +138,11 @@ def kinds_of(text: str) -> frozenset[str]:
     if not kinds or ("input" in kinds and "start" in roles_in(text)):
         return frozenset()
     return frozenset(kinds | {detail for detail in _DETAILS if form(detail).fullmatch(text)})
+
+
+def facts_held(facts: Mapping[str, object]) -> set[str]:
+    """Return what is true."""
+    return {fact for fact, is_true in facts.items() if is_true}
 
 
 def holds(rule: str, facts: Collection[str]) -> bool:

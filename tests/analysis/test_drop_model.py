@@ -174,8 +174,8 @@ def test_an_edge_is_as_sure_as_the_chain_is_slow():
     model, matches, x = case(UNIFORM, seed=3).model()
     for role, match in matches.items():
         found = model.residuals(role, x, match)
-        record = model.records[role]
-        times, burst = (column[match[match >= 0]] for column in record.edges[0:3:2])
+        record, edge = model.records[role], match[match >= 0]
+        times, burst = record.edges.times[edge], record.edges.burst[edge]
         clock = x[model.unknowns["clock"]]
         _, speed = model.trajectory(role, x).heights(times * (1.0 + clock))
         rods = record.due.rods[match >= 0]
