@@ -223,7 +223,7 @@ class FallFit(NamedTuple):
     x
         The drop's unknowns by this side alone, shape ``(unknowns,)``.
     matches
-        Observed edge of every expected edge, −1 if missed; in a list, as those of a drop's sides.
+        Observed edge of every expected edge by role, −1 if missed.
     evidence
         Logarithm of the marginal likelihood, relative to all edges being strays.
     scatter
@@ -231,7 +231,7 @@ class FallFit(NamedTuple):
     """
 
     x: Array
-    matches: list[Index]
+    matches: dict[str, Index]
     evidence: float
     scatter: float
 
@@ -406,7 +406,9 @@ class SideFall:
         scatter = math.sqrt(float(((off / sigma) ** 2).sum()) / max(1, sides.size))
         x = self.unknowns(fall)
         x[self.columns[RELEASE]] = fall[RELEASE] * (1.0 + x[self.columns[CLOCK]])
-        return FallFit(x, [edges], evidence if math.isfinite(evidence) else -math.inf, scatter)
+        return FallFit(
+            x, {self.role: edges}, evidence if math.isfinite(evidence) else -math.inf, scatter
+        )
 
     def nodes(self, most: int = _NODES) -> Array:
         """Return the grid of starting points, the likeliest first, and no more than `most`.

@@ -186,7 +186,7 @@ def gates_too_low(
     tuple of int
         Numbers of the gates in the protocol's list.
     """
-    in_time = None if drop is None else match(drop.model, drop.x, late=False)
+    in_time = None if drop is None else match(drop.model, drop.x)
     counts = gate_counts(records, in_time)
     due, hidden = sum(gate.due for gate in counts), sum(gate.hidden for gate in counts)
     struck, gates = [gate for gate in counts if gate.role == "impact"], protocol.gates.gates

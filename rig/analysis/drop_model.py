@@ -249,8 +249,10 @@ class DropModel:
         subtracted (Cholesky of a 2 × 2 covariance).
         """
         together = seen.paired[:-1] & struck[..., :-1] & struck[..., 1:]
-        first, shared = np.nonzero(together), self.components.departure**2
+        first, scales = np.nonzero(together), self.components
         second, carried = _next(first, 1), np.zeros(values.shape)
+        pair = seen.landed[first[-1]] * seen.landed[second[-1]]
+        shared = scales.departure**2 + SHARED * (1.0 - SHARED) * scales.landed**2 * pair
         carried[second] = share = shared / sigma[first] ** 2
         values[second] -= share * values[first]
         sigma[second] = np.sqrt(sigma[second] ** 2 - share * shared)

@@ -25,7 +25,7 @@ from rig.analysis.chain_records import ChainRecord, chain_records, thin
 from rig.analysis.diagnoses import RIGHT
 from rig.analysis.faults import Fault, Premise, Suspects, faults
 from rig.analysis.fit import Fit, approach, settle
-from rig.analysis.identify import Reading, held_back, identify, side_fall, weigh, well_read
+from rig.analysis.identify import identify, side_fall, well_read
 from rig.analysis.last_passages import APART
 from rig.analysis.score_test import scores
 from rig.analysis.unknowns import prior_air
@@ -165,7 +165,7 @@ class Explainer:
             if all(Pairing(side).matchable >= LEAST * side.edge_count for side in records):
                 yield from self._by_votes([*sized, *discrete])
             return
-        stated = Explanation(_NEITHER, {}, self._evidence(weigh(fit), self.stated.hz))
+        stated = Explanation(_NEITHER, {}, self._evidence(fit, self.stated.hz))
         causes = [stated, *self._along(fit), *self._by_votes(discrete)]
         best = max(causes, key=_EVIDENCE)
         if not (best.whole and best.fault.continuous) and (
@@ -181,8 +181,8 @@ class Explainer:
             scales = fit.model.components
             for name in _DEPARTURES:
                 wider = replace(scales, **{name: _BEYOND * getattr(scales, name)})
-                reading = weigh(settle(approach(fit.model.copy_with(components=wider), fit.x)))
-                yield Explanation(_NEITHER, {}, self._evidence(reading, self.stated.hz) - CLEAR)
+                beyond = settle(approach(fit.model.copy_with(components=wider), fit.x))
+                yield Explanation(_NEITHER, {}, self._evidence(beyond, self.stated.hz) - CLEAR)
 
     def _read_alone(self, record: ChainRecord) -> float:
         """Return the evidence of a side by itself, for a drop that was not identified."""
@@ -190,7 +190,7 @@ class Explainer:
         none = record.edge_count * math.log(MISSED)
         return none if reading is None else self._evidence(reading, self.stated.hz)
 
-    def _read(self, protocol: Protocol, records: Sequence[ChainRecord]) -> Reading | None:
+    def _read(self, protocol: Protocol, records: Sequence[ChainRecord]) -> Fit | None:
         """Return the best reading near the stated values; quicker than all of `identify`."""
         return identify(protocol, records, self.clock_u, batches=1).fit_reading()
 
@@ -200,7 +200,7 @@ class Explainer:
         gains = self._score_odds(fit, self.stated, sized)
         # For a good reading the score test excludes faults without gain. A fault may also remove
         # the penalty for negative drag.
-        least = min(0.0, held_back(fit)) if well_read(fit) else -math.inf
+        least = min(0.0, fit.held_back) if well_read(fit) else -math.inf
         likely: dict[object, Fault] = {}
         for n in np.argsort(-gains).tolist():
             if gains[n] > least:
@@ -228,7 +228,7 @@ class Explainer:
         odds = test.gain - np.log(np.maximum(1.0, (largest - least) / widths)) - cost
         return np.where((least == 0.0) & (test.size < 0.0), -np.inf, odds)
 
-    def _evidence(self, reading: Reading, hz: float) -> float:
+    def _evidence(self, fit: Fit, hz: float) -> float:
         """Return the evidence of a reading, comparable between premises.
 
         Two corrections apply: the density of times is converted to ticks, and the reference of
@@ -236,13 +236,13 @@ class Explainer:
         not for both edges. Otherwise a rod at an end that no gate saw by chance would count as
         absent.
         """
-        records, matches = reading.fit.model.records.values(), reading.fit.matches
+        records, matches = fit.model.records.values(), fit.matches
         ticks = len(self._thinned.edges) * math.log(self.stated.hz / hz)
         missed = 0
         for record in records:
             rods = record.due.gate * record.chain.chain.rods + record.due.rods
             missed += rods.size - np.setdiff1d(rods, rods[matches[record.role] >= 0]).size
-        return reading.evidence + ticks + missed * math.log(MISSED)
+        return fit.evidence + ticks + missed * math.log(MISSED)
 
     def _records(self, premise: Premise) -> list[ChainRecord]:
         return chain_records(
@@ -288,10 +288,10 @@ class Explainer:
     def _afresh(self, fault: Fault, size: float) -> Iterator[Explanation]:
         """Identify the edges anew with a fault of some size, and yield it with its evidence."""
         premise = fault.change(self.stated, size)
-        reading = self._read(premise.protocol, self._records(premise))
-        if reading is None:
+        fit = self._read(premise.protocol, self._records(premise))
+        if fit is None:
             return
-        fit, u, occam = reading.fit, 0.0, math.log(fault.ways or len(fault.sizes))
+        u, occam = 0.0, math.log(fault.ways or len(fault.sizes))
         if fault.continuous:
             yield from self._fit_size(fault, size, fit)
             return
@@ -299,7 +299,7 @@ class Explainer:
             # κ was integrated out like all other unknowns.
             size = fit.model.kappa(fit.x)
             u = float(fit.estimate.own_u[fit.model.unknowns["drag"]][0])
-        yield self._explanation(fault, fault.values(size, u), reading, premise, occam)
+        yield self._explanation(fault, fault.values(size, u), fit, premise, occam)
 
     def _fit_size(self, fault: Fault, size: float, fit: Fit) -> Iterator[Explanation]:
         """Fit a drop with the size of a fault as a further unknown; yield nothing if unclear.
@@ -316,23 +316,23 @@ class Explainer:
         score = scores(fit, [direction], [brake])
         model = fit.model.copy_with(suspects=(fault.suspect(fit.model, direction, brake),))
         first = np.clip(score.size, min(sizes), max(sizes)) * np.append(score.follow, 1.0)
-        reading = weigh(settle(approach(model, np.append(fit.x, 0.0) + first)))
-        estimate = reading.fit.estimate
+        sized = settle(approach(model, np.append(fit.x, 0.0) + first))
+        estimate = sized.estimate
         further, u = float(estimate.x[-1]), float(estimate.own_u[-1])
         if APART * u < abs(size + further) and min(sizes) <= size + further <= max(sizes):
             # A smaller size may be zero, a larger size has another cause.
             premise = premise._replace(hz=premise.hz / (1.0 + model.unknowns.rate[-1] * further))
             values = fault.values(size + further, u) | ({"time_s": brake.time_s} if brake else {})
-            yield self._explanation(fault, values, reading, premise, fault.cost(fit))
+            yield self._explanation(fault, values, sized, premise, fault.cost(fit))
 
     def _explanation(
         self,
         fault: Fault,
         values: Mapping[str, Any],
-        reading: Reading,
+        fit: Fit,
         premise: Premise,
         occam: float = 0.0,
     ) -> Explanation:
-        evidence = self._evidence(reading, premise.hz) - CLEAR - occam
-        complete = well_read(reading.fit) and not self._suggests_fault(reading.fit, premise, fault)
+        evidence = self._evidence(fit, premise.hz) - CLEAR - occam
+        complete = well_read(fit) and not self._suggests_fault(fit, premise, fault)
         return Explanation(fault, values, evidence, complete)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from rig.analysis.adjust import Estimate, adjust
-from rig.analysis.annealing import PART, count_matched, matched
+from rig.analysis.annealing import PART, count_matched, log_density, matched
 from rig.analysis.drop_model import DropModel
-from rig.analysis.equations import STRAY
+from rig.analysis.equations import HUBER, STRAY
 from rig.arrays import Array, Index
 
 Matches = dict[str, Index]
@@ -76,11 +78,46 @@ class DropFit:
         return tuple(rods.tolist())
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Fit(DropFit):
     """A drop fitted by itself."""
 
     estimate: Estimate
+
+    @cached_property
+    def evidence(self) -> float:
+        """Logarithm of the marginal likelihood, up to a constant for the same edges.
+
+        A matched edge contributes the density of its time about the fitted motion; missed edges and
+        strays contribute their prior rates. The unknowns are integrated out by Laplace's method:
+        −½‖y‖² − ln |det R| at the best estimate, with y and RᵀR in units of the prior
+        uncertainties.
+        """
+        estimate, model = self.estimate, self.model
+        total = simultaneous(model, self.x) + self.held_back
+        for role, match in self.matches.items():
+            rows = model.decorrelate(role, model.residuals(role, self.x, match), match)
+            sigma = rows.sigma * estimate.scatter
+            beyond = np.maximum(np.abs(rows.values) / sigma - HUBER, 0.0)
+            total += float(np.sum(log_density(rows.values, sigma, rows.speed) + 0.5 * beyond**2))
+        y = model.unknowns.pull(self.x)
+        total -= 0.5 * float(y @ y) + float(np.linalg.slogdet(estimate.root)[1])
+        return total if math.isfinite(total) else -math.inf
+
+    @property
+    def held_back(self) -> float:
+        """Log of twice the posterior probability of κ > 0, as drag cannot be negative."""
+        at = self.model.unknowns["drag"].start
+        if not self.estimate.sd[at]:
+            return 0.0
+        below = -self.model.kappa(self.x) / float(self.estimate.own_u[at]) / math.sqrt(2.0)
+        return math.log(math.erfc(min(below, 26.0)))  # beyond which a double has no erfc
+
+
+def simultaneous(model: DropModel, x: Array) -> float:
+    """Return the log prior of the release skew: a Cauchy density as wide as the accepted skew."""
+    skew = np.ptp([x[model.unknowns[f"{role} release"]] for role in model.records])
+    return -math.log1p(float(skew / model.protocol.accept.release_skew) ** 2)
 
 
 def approach(model: DropModel, x: Array, matches: Matches | None = None) -> DropFit:
@@ -117,21 +154,18 @@ def alone(drop: DropFit) -> Fit:
     return Fit(drop.model, drop.matches, estimate.x, estimate)
 
 
-def match(model: DropModel, x: Array, *, late: bool = True) -> Matches:
+def match(model: DropModel, x: Array) -> Matches:
     """Match all edges to rods, given the unknowns.
 
-    Parameters
-    ----------
-    late
-        Whether an edge may be late because its rod has struck before it passes, by the scatter of
-        such edges, but at most by a part of the rods' spacing.
+    An edge may be late because its rod has struck before it passes, by the scatter of such edges,
+    but at most by a part of the rods' spacing.
     """
     matches: Matches = {}
     for role, pairing in model.pairings.items():
         times = model.records[role].edges.times * model.rate(x)
         heights, speeds = model.trajectory(role, x).heights(times)
         landed = model.components.landed * model.expected[role].landed
-        sd = np.hypot(_FINE, late * np.minimum(landed, model.records[role].pitch / PART))
+        sd = np.hypot(_FINE, np.minimum(landed, model.records[role].pitch / PART))
         matches[role] = pairing.match(model.all_levels(role, x), heights, speeds, sd)
     return matches
 

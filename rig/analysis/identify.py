@@ -16,27 +16,19 @@ from typing import TypeVar
 
 import numpy as np
 
-from rig.analysis.annealing import (
-    LEAST,
-    MISSED,
-    PEAKS,
-    FallFit,
-    SideFall,
-    count_matched,
-    log_density,
-)
+from rig.analysis.annealing import LEAST, MISSED, PEAKS, FallFit, SideFall, count_matched
 from rig.analysis.chain_records import SIDES, ChainRecord
 from rig.analysis.drop_model import DropModel
-from rig.analysis.equations import HUBER, STRAY
-from rig.analysis.fit import Begun, DropFit, Fit, approach, settle
-from rig.arrays import Array, Index
+from rig.analysis.equations import STRAY
+from rig.analysis.fit import Begun, DropFit, Fit, Matches, approach, settle, simultaneous
+from rig.arrays import Array
 from rig.clock.calibration import TimeScale
 from rig.protocol.gates import CLEARANCE_M
 from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, make_reason
 from rig.vocabulary import ANY_SCENE, Vocabulary
 
-AnyReading = TypeVar("AnyReading", "FallFit", "Reading")
+Reading = TypeVar("Reading", FallFit, Fit)
 
 LEAD = math.log(1000.0)
 """Least log odds of a reading against the likeliest different one; below, a drop is ambiguous."""
@@ -49,27 +41,6 @@ RESTLESS = 2.0
 """Scatter of the edges, relative to the assumed scatter, above which a remark is made."""
 _CLOSE = 30.0
 """Log odds within which annealed readings are fitted: annealing leaves unknowns out."""
-
-
-@dataclass(frozen=True, slots=True)
-class Reading:
-    """A candidate assignment of a drop's edges to rods, fitted.
-
-    Attributes
-    ----------
-    fit
-        Matches and fit.
-    evidence
-        Logarithm of the marginal likelihood, up to a constant for the same edges.
-    """
-
-    fit: Fit
-    evidence: float
-
-    @property
-    def matches(self) -> list[Index]:
-        """For each side the observed edge of every expected edge, −1 if missed."""
-        return [*self.fit.matches.values()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,14 +65,13 @@ class Identification:
     log_odds: float = math.inf
     other: Fit | None = None
 
-    def fit_reading(self) -> Reading | None:
+    def fit_reading(self) -> Fit | None:
         """Fit the best reading; `None` if there is none that explains the edges."""
         drop = self.drop
         if drop is None:
             return None
         fit = drop if isinstance(drop, Fit) else settle(approach(drop.model, drop.x, drop.matches))
-        reading = weigh(fit)
-        return reading if reading.evidence > 0.0 else None
+        return fit if fit.evidence > 0.0 else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +124,7 @@ def identify(
     if all(side and side[0].evidence > 0.0 for side in readings.values()):
         return _together(model, readings)
     shares = {
-        role: max((count_matched(*reading.matches) for reading in side), default=0)
+        role: max((count_matched(reading.matches[role]) for reading in side), default=0)
         / max(1, model.records[role].edge_count)
         for role, side in readings.items()
     }
@@ -209,60 +179,34 @@ def _read(fall: SideFall, earliest: float, batches: int | None) -> list[FallFit]
         if len(starts):
             readings = _rank_readings([*readings, *fall.anneal(starts, _CLOSE)])
             best = readings[0]
-            if best.scatter < RESTLESS and count_matched(*best.matches) >= enough:
+            if best.scatter < RESTLESS and count_matched(best.matches[fall.role]) >= enough:
                 break
     return readings
 
 
-def _rank_readings(readings: Iterable[AnyReading]) -> list[AnyReading]:
+def _rank_readings(readings: Iterable[Reading]) -> list[Reading]:
     """Sort readings, the likeliest first, without those that equal a likelier reading."""
-    ranked: list[AnyReading] = []
+    ranked: list[Reading] = []
     for reading in sorted(readings, key=lambda candidate: -candidate.evidence):
-        if all(any(map(_unlike, reading.matches, likelier.matches)) for likelier in ranked):
+        if all(_unlike(reading.matches, likelier.matches) for likelier in ranked):
             ranked.append(reading)
     return ranked
 
 
-def _unlike(edges: Index, other_edges: Index) -> bool:
-    """Whether two readings differ in more edges than strays and missed edges explain."""
-    matched = int(np.count_nonzero((edges >= 0) | (other_edges >= 0)))
-    return bool(np.count_nonzero(edges != other_edges) > max(SIDES, MISSED * matched))
-
-
-def log_evidence(fit: Fit) -> float:
-    """Return the log marginal likelihood of a reading, up to a constant for the same edges.
-
-    A matched edge contributes the density of its time about the fitted motion; missed edges and
-    strays contribute their prior rates. The unknowns are integrated out by Laplace's method:
-    −½‖y‖² − ln |det R| at the best estimate, with y and RᵀR in units of the prior uncertainties.
-    """
-    estimate, model = fit.estimate, fit.model
-    total = 0.0
-    for role, match in fit.matches.items():
-        rows = model.decorrelate(role, model.residuals(role, estimate.x, match), match)
-        sigma = rows.sigma * estimate.scatter
-        beyond = np.maximum(np.abs(rows.values) / sigma - HUBER, 0.0)
-        total += float(np.sum(log_density(rows.values, sigma, rows.speed) + 0.5 * beyond**2))
-    y = model.unknowns.pull(estimate.x)
-    _, volume = np.linalg.slogdet(estimate.root)
-    return total - 0.5 * float(y @ y) - float(volume) + held_back(fit)
-
-
-def held_back(fit: Fit) -> float:
-    """Return the log of twice the posterior probability of κ > 0, as drag cannot be negative."""
-    model, estimate = fit.model, fit.estimate
-    at = model.unknowns["drag"].start
-    if not estimate.sd[at]:
-        return 0.0
-    below = -model.kappa(estimate.x) / float(estimate.own_u[at]) / math.sqrt(2.0)
-    return math.log(math.erfc(min(below, 26.0)))  # beyond which a double has no erfc
+def _unlike(matches: Matches, others: Matches) -> bool:
+    """Whether two readings differ on a side in more edges than strays and missed edges explain."""
+    for edges, other_edges in zip(matches.values(), others.values(), strict=True):
+        matched = int(np.count_nonzero((edges >= 0) | (other_edges >= 0)))
+        if np.count_nonzero(edges != other_edges) > max(SIDES, MISSED * matched):
+            return True
+    return False
 
 
 def _together(model: DropModel, readings: Mapping[str, Sequence[FallFit]]) -> Identification:
     """Return the likeliest pair of both sides' readings with its odds; rivals are fitted first."""
 
     def likely(pair: Sequence[FallFit]) -> float:
-        return sum(side.evidence for side in pair) + _simultaneous(model, _merge(model, pair))
+        return sum(side.evidence for side in pair) + simultaneous(model, _merge(model, pair))
 
     pairs = sorted(itertools.product(*readings.values()), key=likely, reverse=True)
     likeliest = likely(pairs[0])
@@ -271,11 +215,11 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[FallFit]]) -> Id
     drops = [_begin(model, pair) for pair in close]
     best, evidence, odds, other = drops[0], likeliest, further, None
     if len(drops) > 1:
-        tried = [weigh(settle(approach(drop.model, drop.x, drop.matches))) for drop in drops]
+        tried = [settle(approach(drop.model, drop.x, drop.matches)) for drop in drops]
         likelier, *rest = _rank_readings(tried)
-        best, evidence = likelier.fit, likelier.evidence
+        best, evidence = likelier, likelier.evidence
         if rest:
-            odds, other = min(further, evidence - rest[0].evidence), rest[0].fit
+            odds, other = min(further, evidence - rest[0].evidence), rest[0]
     return Identification(best if evidence > 0.0 else None, best.shares, odds, other)
 
 
@@ -283,7 +227,7 @@ def _begin(model: DropModel, pair: Sequence[FallFit]) -> DropFit:
     """Return a drop with the matches and unknowns of annealed falls."""
     x = _merge(model, pair)
     alpha = float(x[model.unknowns["alpha"]][0]) if "impact" in model.records else 0.0
-    matches = {role: side.matches[0] for role, side in zip(model.records, pair, strict=True)}
+    matches = {role: side.matches[role] for role, side in zip(model.records, pair, strict=True)}
     return DropFit(model.copy_with(alpha=alpha), matches, x)
 
 
@@ -293,18 +237,6 @@ def _merge(model: DropModel, pair: Sequence[FallFit]) -> Array:
     for name in ("drop", "clock", "gravity", "drag"):
         x[model.unknowns[name]] /= len(pair)
     return x
-
-
-def weigh(fit: Fit) -> Reading:
-    """Return a fit of all sides with its evidence."""
-    evidence = log_evidence(fit) + _simultaneous(fit.model, fit.x)
-    return Reading(fit, evidence if math.isfinite(evidence) else -math.inf)
-
-
-def _simultaneous(model: DropModel, x: Array) -> float:
-    """Return the log prior of the release skew: a Cauchy density as wide as the accepted skew."""
-    skew = np.ptp([x[model.unknowns[f"{role} release"]] for role in model.records])
-    return -math.log1p(float(skew / model.protocol.accept.release_skew) ** 2)
 
 
 def deciding_gate(likelier: DropFit, rival: DropFit) -> tuple[str, float]:

@@ -33,6 +33,9 @@ if TYPE_CHECKING:
     Effect = Callable[["Side"], Array]
     Prior = Callable[["Side"], float | Sequence[float] | Array | None]
 
+HEAP = 0.15
+"""Height of a heap of rods in units of the sum of their thicknesses: up to 0.3 on a level board in
+resolved falls, and hardly any at 35°."""
 ANY_GRAVITY = 5.0
 """Prior standard uncertainty of gravity where it is the measurand, m/s²."""
 
@@ -252,9 +255,13 @@ def _turned_sd(side: Side) -> float | None:
 
 
 def _strike_sd(side: Side) -> float:
-    """Prior of the strike height; the top rod may strike as high as beams not all rods pass."""
+    """Prior of the strike height; the top rod may strike as high as beams not all rods pass.
+
+    A heap of rods is a part of their thickness high.
+    """
     lying = [side.gates.gates[gate].height for gate in side.record.aside]
-    return max([float(strike_u(side.record, side.protocol)[-1]), *lying])
+    heap = HEAP * sum(side.record.chain.diameters) * (side.record.uneven > 1.0)
+    return max([float(strike_u(side.record, side.protocol)[-1]), heap, *lying])
 
 
 def _off_centre_sd(side: Side) -> float | None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from rig.analysis.chain_records import chain_records
 from rig.analysis.drop import DropCase
 from rig.analysis.gravity import check_gravity
-from rig.analysis.identify import log_evidence, side_fall
+from rig.analysis.identify import side_fall
 from rig.analysis.result import DropResult
 from rig.clock.calibration import TimeScale
 from rig.clock.epochs import RESONATOR_TOLERANCE
@@ -100,7 +100,7 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
         near, expected = near + matched, expected + due
         if exact and len(results) < _COMPARED:
             result, fit = DropCase(protocol, run, drop, rate).read(explain=False)
-            evidence += log_evidence(fit) if fit else 0.0
+            evidence += fit.evidence if fit else 0.0
             results.append(result)
     sums = {"compared": len(shares) - 1, "runs": len(compared), "near": near, "due": expected}
     text = make_reason("falls_fit", **sums).text

@@ -96,7 +96,7 @@ class Case:
 
     def model(self) -> tuple[DropModel, dict, np.ndarray]:
         """The observation equations of this drop, its fall, and the matches that it gives."""
-        fit = self.identify().fit_reading().fit
+        fit = self.identify().fit_reading()
         x, at = np.zeros(fit.x.size), fit.model.unknowns
         for name in ("impact release", "free release", "alpha", "clock", "drag", "drop"):
             if name in at:
