@@ -14,7 +14,7 @@ from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer
 from rig.analysis.faults import Premise, Suspects
-from rig.analysis.fit import Begun, DropFit, Fit, approach, settle
+from rig.analysis.fit import Begun, DropFit, Fit, settle
 from rig.analysis.gravity import free_gravity
 from rig.analysis.identify import DropIdentity, few_edges, identify, pattern_faults
 from rig.analysis.joint_fit import by_itself
@@ -150,26 +150,19 @@ class DropCase:
             reasons = (make_reason("record_damaged", text=drop.damage),)
             return DropResult(self.run, drop.attempt, "void", reasons, Audit(), damaged=True), None
         case = stated = self._at_contact()
-        whole = reading = stated._identify(readings)
-        begun = latest = stated._begin(whole)
+        reading, latest, low = stated._identify(readings), None, stated.aside
         fits: dict[tuple[int, ...], tuple[DropIdentity, Fit | None]] = {}
-        # Not identified with all gates, a drop says nothing about those that are left out.
-        while (low := (case if begun is None else stated)._too_low(latest)) not in fits:
+        while low not in fits:
             case = replace(stated, aside=low)
-            if not low:
-                fits[low] = case._settle(whole, begun)
-            elif latest is None:
-                reading = case._identify(readings)
-                fits[low] = case._settle(reading, case._begin(reading))
-            else:
-                fits[low] = reading, settle(approach(case._model(latest.model.alpha), latest.x))
-            reading, latest = fits[low]
+            reading = reading if latest else case._identify(readings)
+            fits[low] = reading, latest = case._settle(reading, latest)
+            # Not identified with all gates, a drop says nothing about those that are left out.
+            low = (stated if fits[stated.aside][1] else case)._too_low(latest)
         if case.aside:
             without = result, _ = case._judge(*fits[case.aside], readings, explain=False)
             if not is_wrong(result.reasons):
                 return without
-        with_all = fits.get(()) or stated._settle(whole, begun)
-        return stated._judge(*with_all, readings, explain=explain)
+        return stated._judge(*fits[stated.aside], readings, explain=explain)
 
     def _too_low(self, drop: DropFit | None) -> tuple[int, ...]:
         """Return the gates that are left out or too low for a drop, fitted with any of them."""
@@ -200,25 +193,19 @@ class DropCase:
             readings[self.aside] = reading
         return reading
 
-    def _settle(
-        self, reading: DropIdentity, begun: DropFit | None
-    ) -> tuple[DropIdentity, Fit | None]:
+    def _settle(self, reading: DropIdentity, before: Fit | None) -> tuple[DropIdentity, Fit | None]:
         """Return the identification of a drop, and its fit if the edges match a fall."""
-        if begun is None:
-            return reading, None
-        fit = settle(begun)
-        unlike = few_edges(fit.shares, self.protocol.vocabulary)
-        return replace(reading, unlike=unlike), None if unlike else fit
-
-    def _begin(self, reading: DropIdentity) -> DropFit | None:
-        """Return the identified drop at this time scale, roughly fitted."""
+        if before is not None:
+            return reading, settle(self._model(before.model.alpha), before.x)
         if reading.begun is None:
-            return None
+            return reading, None
         alpha, matches, x = reading.begun
         model, x = self._model(alpha), x.copy()
         clock = model.unknowns["clock"]
         x[clock] = (1.0 + x[clock]) * self.scale.hz / reading.scale.hz - 1.0
-        return approach(model, x, matches)
+        fit = settle(model, x, matches)
+        unlike = few_edges(fit.shares, self.protocol.vocabulary)
+        return replace(reading, unlike=unlike), None if unlike else fit
 
     def _judge(
         self, reading: DropIdentity, fit: Fit | None, readings: Readings, *, explain: bool

@@ -24,7 +24,7 @@ from rig.analysis.annealing import LEAST, MISSED, Pairing
 from rig.analysis.chain_records import ChainRecord, chain_records, thin
 from rig.analysis.diagnoses import RIGHT
 from rig.analysis.faults import Fault, Premise, Suspects, faults
-from rig.analysis.fit import Fit, approach, settle
+from rig.analysis.fit import Fit, settle
 from rig.analysis.identify import identify, side_fall, well_read
 from rig.analysis.last_passages import APART
 from rig.analysis.score_test import scores
@@ -181,7 +181,7 @@ class Explainer:
             scales = fit.model.components
             for name in _DEPARTURES:
                 wider = replace(scales, **{name: _BEYOND * getattr(scales, name)})
-                beyond = settle(approach(fit.model.copy_with(components=wider), fit.x))
+                beyond = settle(fit.model.copy_with(components=wider), fit.x)
                 yield Explanation(_NEITHER, {}, self._evidence(beyond, self.stated.hz) - CLEAR)
 
     def _read_alone(self, record: ChainRecord) -> float:
@@ -316,7 +316,7 @@ class Explainer:
         score = scores(fit, [direction], [brake])
         model = fit.model.copy_with(suspects=(fault.suspect(fit.model, direction, brake),))
         first = np.clip(score.size, min(sizes), max(sizes)) * np.append(score.follow, 1.0)
-        sized = settle(approach(model, np.append(fit.x, 0.0) + first))
+        sized = settle(model, np.append(fit.x, 0.0) + first)
         estimate = sized.estimate
         further, u = float(estimate.x[-1]), float(estimate.own_u[-1])
         if APART * u < abs(size + further) and min(sizes) <= size + further <= max(sizes):

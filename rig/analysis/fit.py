@@ -120,8 +120,8 @@ def simultaneous(model: DropModel, x: Array) -> float:
     return -math.log1p(float(skew / model.protocol.accept.release_skew) ** 2)
 
 
-def approach(model: DropModel, x: Array, matches: Matches | None = None) -> DropFit:
-    """Fit a drop roughly, and match its edges anew.
+def settle(model: DropModel, x: Array, matches: Matches | None = None) -> Fit:
+    """Fit and match in turn until the matches stay the same, and return the fit.
 
     Parameters
     ----------
@@ -130,20 +130,13 @@ def approach(model: DropModel, x: Array, matches: Matches | None = None) -> Drop
     matches
         Matches to begin with; those at `x` if not given.
     """
-    matches = match(model, x) if matches is None else matches
-    # This fit need not converge, as matches will change.
-    x = adjust(model, matches, x, done=_NEAR, rough=True).x
-    return DropFit(model, without_strays(model, x, match(model, x)), x)
-
-
-def settle(drop: DropFit) -> Fit:
-    """Fit and match in turn until the matches stay the same, and return the fit."""
-    model, scatter, x, matches = drop.model, 1.0, drop.x, drop.matches
-    for _ in range(_ROUNDS):
-        used, estimate = matches, adjust(model, matches, x, done=CLOSE, scatter=scatter)
-        x, scatter = estimate.x, estimate.scatter
+    matches, scatter = match(model, x) if matches is None else matches, 1.0
+    for done in (_NEAR, *[CLOSE] * _ROUNDS):
+        rough, used = done == _NEAR, matches  # this fit need not converge, as matches will change
+        estimate = adjust(model, matches, x, done=done, scatter=scatter, rough=rough)
+        x, scatter = estimate.x, 1.0 if rough else estimate.scatter
         matches = without_strays(model, x, match(model, x), scatter)
-        if all(np.array_equal(side, matches[role]) for role, side in used.items()):
+        if not rough and all(np.array_equal(used[role], matches[role]) for role in used):
             break
     return Fit(model, used, x, estimate)
 

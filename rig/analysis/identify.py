@@ -20,7 +20,7 @@ from rig.analysis.annealing import LEAST, MISSED, PEAKS, FallFit, SideFall, coun
 from rig.analysis.chain_records import SIDES, ChainRecord
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY
-from rig.analysis.fit import Begun, DropFit, Fit, Matches, approach, settle, simultaneous
+from rig.analysis.fit import Begun, DropFit, Fit, Matches, settle, simultaneous
 from rig.arrays import Array
 from rig.clock.calibration import TimeScale
 from rig.protocol.gates import CLEARANCE_M
@@ -70,7 +70,7 @@ class Identification:
         drop = self.drop
         if drop is None:
             return None
-        fit = drop if isinstance(drop, Fit) else settle(approach(drop.model, drop.x, drop.matches))
+        fit = drop if isinstance(drop, Fit) else settle(drop.model, drop.x, drop.matches)
         return fit if fit.evidence > 0.0 else None
 
 
@@ -215,7 +215,7 @@ def _together(model: DropModel, readings: Mapping[str, Sequence[FallFit]]) -> Id
     drops = [_begin(model, pair) for pair in close]
     best, evidence, odds, other = drops[0], likeliest, further, None
     if len(drops) > 1:
-        tried = [settle(approach(drop.model, drop.x, drop.matches)) for drop in drops]
+        tried = [settle(drop.model, drop.x, drop.matches) for drop in drops]
         likelier, *rest = _rank_readings(tried)
         best, evidence = likelier, likelier.evidence
         if rest:
