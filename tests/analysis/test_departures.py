@@ -244,4 +244,4 @@ def test_the_strongest_pulls_that_a_protocol_may_state_are_measured():
 def test_late_pulls_are_as_uncertain_as_stated_however_wide_the_last_impulse_is():
     text = f"{SINGLE.text}priors: {{last_impulse: 200 %}}\n"
     model, *_ = replace(case(SINGLE), protocol=parse(text)).model()
-    assert model.unknowns.sd[model.unknowns["late"]] == pytest.approx(0.25 * model.alpha)
+    assert model.unknowns.sd[model.unknowns["late"]] == pytest.approx(0.2 * model.alpha)
