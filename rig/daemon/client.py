@@ -19,12 +19,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Self
 
+import msgspec
+
 from rig.daemon import rpc
 from rig.daemon.lease import LEASE_S
 from rig.daemon.replica import Replica
 from rig.daemon.socket_path import check_folder
 from rig.errors import RigError
-from rig.reasons import Reason, rig_error
+from rig.reasons import Reason, errors_become, rig_error
 from rig.recorder.interrupts import Interrupts
 from rig.records import Drop
 from rig.session.reading import Reader
@@ -121,7 +123,9 @@ class Line:
         try:
             with self._socket.makefile("rb") as stream:
                 while (line := stream.readline(rpc.MESSAGE_LIMIT)).endswith(b"\n"):
-                    self._take(_message_of(line))
+                    with errors_become("not_a_daemon", ValueError, msgspec.ValidationError):
+                        message = msgspec.convert(json.loads(line), dict[str, Any])
+                    self._take(message)
         except RigError as error:
             over = error
         except OSError as error:
@@ -141,7 +145,7 @@ class Line:
             self._notify(message["method"], message["params"])
             return
         if "error" in message and message.get("id") is None:  # it hangs up after this
-            raise rpc.error_of(message)
+            raise rpc.error_of(message["error"])
         answer = self._open.pop(message["id"], None)
         result = message.get("result")
         if isinstance(result, dict) and "state" in result:
@@ -149,7 +153,7 @@ class Line:
         if answer is None or not answer.set_running_or_notify_cancel():
             return
         if message.get("error") is not None:
-            answer.set_exception(rpc.error_of(message))
+            answer.set_exception(rpc.error_of(message["error"]))
         else:
             answer.set_result(result)
 
@@ -344,16 +348,6 @@ class AsyncClient:
     def _end(self) -> None:
         self.lost.set()
         self.changed()
-
-
-def _message_of(line: bytes) -> dict[str, Any]:
-    try:
-        message = json.loads(line)
-    except ValueError:
-        message = None
-    if not isinstance(message, dict):
-        raise rig_error("not_a_daemon")
-    return message
 
 
 def _result(answer: Future[Any], patience_s: float, silent: RigError) -> Any:

@@ -163,17 +163,13 @@ class Server:
             reader, writer, self.service.do, self.service.lease.heard, self._turns
         )
         self.service.connections.add(connection)
-        late = loop.call_later(HELLO_S, self._hurry, connection)
+        late = loop.call_later(HELLO_S, connection.hurry)
         try:
             await connection.serve()
         finally:
             late.cancel()
             self.service.forget(connection)
             connection.close()
-
-    def _hurry(self, connection: Connection) -> None:
-        if not connection.is_client:
-            connection.turn_away(rig_error("hello_late", patience_s=HELLO_S))
 
     # ------------------------------------------------------------------ what is looked at
 
@@ -188,17 +184,11 @@ class Server:
         self._left_at = asyncio.get_running_loop().time()
         while True:
             await asyncio.sleep(_LOOK_S)
-            self._see_lease()
+            self.service.show_control()  # it lapses also when its holder says nothing
             self._see_worker()
             self._see_rest()
             if not (door.there() or self.published.get("clients")):
                 raise rig_error("socket_lost", path=door.path, folder=state_folder())
-
-    def _see_lease(self) -> None:
-        """See that control lapses also when its holder says nothing."""
-        if self.published.get("control") is not None and self.service.lease.holder is None:
-            self._worker.wake()
-        self.service.show_control()
 
     def _see_worker(self) -> None:
         """Tell every client when nothing is known any more, and when it is again."""

@@ -97,14 +97,15 @@ class Service:
     def release(self, client: Connection) -> None:
         """Take control away from a client, when it has it."""
         if self.lease.release(client):
-            self.worker.wake()
             self.show_control()
 
     def show_control(self) -> None:
-        """Show who is in control now."""
+        """Show who is in control now; what was armed by whoever lost it is disarmed."""
         control = None if self.lease.holder is None else {"client": self.lease.name}
         if control != self.published.get("control"):
             log.info("in control: %s", control["client"] if control else "nobody")
+            if control is None:
+                self.worker.wake()
         self.published.set(control=control)
 
 

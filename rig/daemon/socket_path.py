@@ -67,5 +67,4 @@ def peer_uid(connection: socket.socket) -> int | None:
     if option is None or connection.family != socket.AF_UNIX:
         return None
     data = connection.getsockopt(socket.SOL_SOCKET, option, _CREDENTIALS.size)
-    uid: int = _CREDENTIALS.unpack(data)[1]
-    return uid
+    return int(_CREDENTIALS.unpack(data)[1])

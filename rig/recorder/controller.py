@@ -235,16 +235,13 @@ class Controller:
                 raise rig_error("drop_of_another_session", run=run, attempt=attempt)
             recorder.collect(*held, fresh=False)
             self._lost.pop(held, None)
-        for run, attempt in self._without_drop(RunState.ARMED, RunState.FIRED):
-            why = (make_reason("connection_ended"),)
-            recorder.state(run, attempt, RunState.INTERRUPTED, why)
+        latest = {entry.run: entry for entry in self.session.states()}
+        for run, attempt, state, *_ in latest.values():
+            is_begun = state in {RunState.ARMED, RunState.FIRED}
+            if is_begun and self.session.drop(run, attempt) is None:
+                why = (make_reason("connection_ended"),)
+                recorder.state(run, attempt, RunState.INTERRUPTED, why)
         return held
-
-    def _without_drop(self, *states: RunState) -> list[tuple[int, int]]:
-        """List the attempts that are logged last in one of these states, with no drop stored."""
-        latest = {entry.run: entry for entry in self.session.states()}.values()
-        jobs = [(entry.run, entry.attempt) for entry in latest if entry.state in states]
-        return [job for job in jobs if self.session.drop(*job) is None]
 
     # ------------------------------------------------------------------ drops
 

@@ -20,9 +20,8 @@ class Interrupts:
     good.
     """
 
-    def __init__(self) -> None:
-        self._is_let_through = False
-        self._asked = 0
+    _is_let_through = False
+    _asked = 0
 
     @contextmanager
     def caught(self) -> Iterator[None]:

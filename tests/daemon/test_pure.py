@@ -49,7 +49,7 @@ ERRORS = [
 @pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
 def test_an_error_comes_out_as_it_went_in(error):
     line = rpc.failure(7, error)
-    again = rpc.error_of(json.loads(line))
+    again = rpc.error_of(json.loads(line)["error"])
     assert type(again) is type(error)
     assert str(again) == str(error)
     for name in ("exit_code", "reason", "detail", "disarmed", "reasons"):
@@ -65,12 +65,12 @@ def test_a_refusal_has_its_code_and_values_as_results_have_them():
 
 
 def test_an_error_of_a_kind_nobody_listed_becomes_the_one_above_it():
-    again = rpc.error_from_data(rpc.error_to_data(errors.DomainError("Eq. 13 is singular")))
+    again = rpc.error_of({"data": rpc.error_to_data(errors.DomainError("singular"))})
     assert type(again) is errors.InputError
 
 
 def test_an_error_of_a_kind_only_the_daemon_knows_is_an_error_all_the_same():
-    again = rpc.error_from_data({"kind": "NewerError", "message": "m", "hint": "h", "exit_code": 3})
+    again = rpc.error_of({"data": {"kind": "New", "message": "m", "hint": "h", "exit_code": 3}})
     assert (type(again), str(again), again.exit_code) == (errors.RigError, "m\n  hint: h", 3)
 
 
