@@ -5,8 +5,6 @@ returns what came of them, with the ticket of the effect: an answer to what was 
 has an old ticket and changes nothing. Stages, events and effects come first, then the steps.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import NamedTuple, TypeAlias
@@ -295,7 +293,7 @@ class Flow:
     attended: bool = True
     row: VoidRow = ()
 
-    def to(self, stage: Stage, trouble: str = "") -> Flow:
+    def to(self, stage: Stage, trouble: str = "") -> "Flow":
         """Go to another stage; answers to earlier effects count no more."""
         return replace(
             self, stage=stage, ticket=self.ticket + 1, trouble=trouble, home=Stage.PREPARE

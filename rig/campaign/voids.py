@@ -1,7 +1,5 @@
 """Voids in a row: what they have in common, and which of them are held against their runs."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple

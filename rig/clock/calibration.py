@@ -1,7 +1,5 @@
 """The time scale of a session: from its clock samples to seconds, and how far to trust them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from math import floor, hypot, log2, sqrt
 from typing import Any, NamedTuple, Protocol
@@ -36,7 +34,7 @@ class TimeScale(NamedTuple):
     hz: float
     u: float
 
-    def coarse(self) -> TimeScale:
+    def coarse(self) -> "TimeScale":
         """Return a scale near by, good enough to tell rods apart: further samples leave it."""
         step = 2.0 ** floor(log2(_ROUGH * self.hz))
         return TimeScale(step * round(self.hz / step), max(self.u, _ROUGH))

@@ -1,7 +1,5 @@
 """Ticks of 32 bits made wide, in epochs between restarts of the board."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The host's clock, which can be replaced, and whether the host's clocks go on as one."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import NamedTuple, Protocol

@@ -6,8 +6,6 @@ Soc. B 40, 364) and its variance exact. The size itself is the most likely one (
 small as a steady clock's unless the readings speak clearly against that.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import sqrt
 
@@ -47,7 +45,7 @@ class Readings:
     sigma: Array
     epoch: Index
 
-    def only(self, which: NDArray[np.bool_]) -> Readings:
+    def only(self, which: NDArray[np.bool_]) -> "Readings":
         """Choose some; epochs left with fewer than two say nothing and are left out."""
         counts = np.bincount(self.epoch[which], minlength=int(self.epoch.max(initial=-1)) + 1)
         which = which & (counts[self.epoch] >= 2)

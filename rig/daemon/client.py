@@ -3,8 +3,6 @@
 Scripts and the runner wait; faces, which show what is going on, have a loop of their own.
 """
 
-from __future__ import annotations
-
 import asyncio
 import itertools
 import json

@@ -1,7 +1,5 @@
 """The rig as its clients see it: through the daemon that owns the port, or without one."""
 
-from __future__ import annotations
-
 import logging
 import os
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """One client of the daemon: its lines, its turn, and what it has not read yet."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
@@ -50,8 +48,8 @@ class Connection:
 
     reader: asyncio.StreamReader
     writer: asyncio.StreamWriter
-    do: Callable[[Connection, Message], Awaitable[Any]]
-    heard: Callable[[Connection], None]
+    do: Callable[["Connection", Message], Awaitable[Any]]
+    heard: Callable[["Connection"], None]
     turns: asyncio.Lock
     name: str = ""
     is_client: bool = False

@@ -1,7 +1,5 @@
 """JSON-RPC 2.0, one message a line, and errors as data: a client shows what the daemon raised."""
 
-from __future__ import annotations
-
 import json
 import logging
 from typing import Any, Literal

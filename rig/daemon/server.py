@@ -1,7 +1,5 @@
 """The daemon's life: clients on a local socket, served beside the worker and never in its way."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import os

@@ -1,7 +1,5 @@
 """The methods of the interface, see API.md: one table of what they do, take and need."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import os

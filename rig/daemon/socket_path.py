@@ -1,7 +1,5 @@
 """Where a daemon is found, and that nobody else's is taken for it."""
 
-from __future__ import annotations
-
 import os
 import socket
 import struct

@@ -5,8 +5,6 @@ trouble of the link or the disk becomes a state that every client sees, and ends
 worker connects again, with growing pauses, and settles what was under way.
 """
 
-from __future__ import annotations
-
 import logging
 import math
 import queue

@@ -1,7 +1,5 @@
 """Checks of a session file: whether it is whole, and what its board did meanwhile."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path

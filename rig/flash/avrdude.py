@@ -1,7 +1,5 @@
 """Calling avrdude, showing what it says, and saying what went wrong."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from contextlib import suppress

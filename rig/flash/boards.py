@@ -1,7 +1,5 @@
 """The boards that can be flashed: how, and what they call themselves."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NamedTuple
 

@@ -1,25 +1,20 @@
 """A Pico that waits for firmware: the drive that it shows, and copying a file to it."""
 
-from __future__ import annotations
-
 import os
 import re
 import time
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError
 from rig.flash.boards import DRIVE
+from rig.flash.image import Image
 from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.port import open_port, port_clock
 from rig.reasons import rig_error
 from rig.usb.listing import serial_ports
-
-if TYPE_CHECKING:
-    from rig.flash.image import Image
 
 _ABOUT = "INFO_UF2.TXT"  # the boot program's file about the board
 _BOARD = "RPI-RP2"

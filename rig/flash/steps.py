@@ -1,7 +1,5 @@
 """Flashing a board, from the file to the handshake."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import closing
 

@@ -1,7 +1,5 @@
 """Puts one drop together from the messages about it, in whatever order they come."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields

@@ -1,7 +1,5 @@
 """The host's side of the conversation: requests, repeats, and the reading of a drop."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 from functools import partial

@@ -1,7 +1,5 @@
 """Requests and their answers: repeats, time-outs, and the reading of the port."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -5,8 +5,6 @@ zero always means "a frame ends here" and a receiver is in step again after one 
 check is CRC-16/CCITT-FALSE over everything before it, little-endian like all numbers here.
 """
 
-from __future__ import annotations
-
 from binascii import crc_hqx
 from typing import NamedTuple
 

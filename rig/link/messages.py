@@ -18,8 +18,6 @@ simply be made anew. All gates of ARM must be clear then and at FIRE, so `initia
 armed gates is 0; the other gates are left out of every event.
 """
 
-from __future__ import annotations
-
 import struct
 import typing
 from collections.abc import Iterable
@@ -175,7 +173,7 @@ class PulseEnd(IntEnum):
     DEVICE = 3  # the device, to be safe: its main loop stood still, or the pin did not obey
 
 
-TABLE: dict[int, type[Message]] = {}
+TABLE: dict[int, type["Message"]] = {}
 """Every message by its code."""
 
 

@@ -1,7 +1,5 @@
 """Opening a port by name or URL: ``/dev/ttyACM0``, ``sim://``, ``socket://HOST:PORT``."""
 
-from __future__ import annotations
-
 import errno
 import socket
 import warnings

@@ -1,7 +1,5 @@
 """What a refusal means, and what the user can do about it."""
 
-from __future__ import annotations
-
 from rig.boards import GATES
 from rig.errors import DeviceError
 from rig.link.messages import PROTOCOL_VERSION, DisarmReason, RefusalReason

@@ -5,8 +5,6 @@ get the same drops by construction. How the bytes were cut into chunks matters o
 times of clock samples and for the lone delimiter with which a client begins a connection.
 """
 
-from __future__ import annotations
-
 from typing import Literal, NamedTuple, TypeAlias
 
 from rig.link import messages as wire

@@ -1,7 +1,5 @@
 """Where a board is now: found again by its serial number, and never taken for another one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from rig.link.messages import Identity

@@ -1,7 +1,5 @@
 """What clients can ask for, carried out on one port and one session file by one thread."""
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from pathlib import Path

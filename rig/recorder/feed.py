@@ -4,8 +4,6 @@ Provisional on purpose: frames that come out of order are left to the record, wh
 certificate vouches for.
 """
 
-from __future__ import annotations
-
 from rig.link import messages as wire
 from rig.link.assembly import ALL_GATES, edges
 from rig.link.transcript import Incoming, Record

@@ -1,7 +1,5 @@
 """Ctrl-C, SIGTERM and STOP: how what is under way is ended without tearing a record apart."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager

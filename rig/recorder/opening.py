@@ -1,7 +1,5 @@
 """Making a session file, or finding that one can be gone on with."""
 
-from __future__ import annotations
-
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any

@@ -5,8 +5,6 @@ messages is put together into one, so the rate of messages is the reader's choic
 is that of the state itself, however fast the device talks.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager

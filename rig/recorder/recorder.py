@@ -1,7 +1,5 @@
 """One device and one session file: what is measured is on the disk before it is let go of."""
 
-from __future__ import annotations
-
 import logging
 import random
 from collections.abc import Callable, Iterator

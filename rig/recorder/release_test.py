@@ -1,7 +1,5 @@
 """The release driven once with nothing hung from it: a drop of no run, of which only bytes stay."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any

@@ -1,7 +1,5 @@
 """Recovery of drops from their stored rows and from the raw bytes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import groupby
 from operator import itemgetter

@@ -1,7 +1,5 @@
 """Examination of a session file: identity, damage, and readable drops."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

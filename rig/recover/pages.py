@@ -5,8 +5,6 @@ page is read independently. The format is https://www.sqlite.org/fileformat2.htm
 its sections.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 from typing import TypeAlias

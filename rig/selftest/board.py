@@ -1,7 +1,5 @@
 """A board under test: the link's client, which asks anything and brings the board back to rest."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property

@@ -3,8 +3,6 @@
 Nothing falls. The last check needs a wire, from the sync output to a gate input.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from statistics import fmean, stdev
 

@@ -1,7 +1,5 @@
 """How a check of the self-test or the doctor can end."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from enum import StrEnum

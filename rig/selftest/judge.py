@@ -4,8 +4,6 @@ The other board's gates time the outputs of this one; its releases are this one'
 docs/first-board.md lists the wires.
 """
 
-from __future__ import annotations
-
 from statistics import stdev
 
 from rig.clock.epochs import RESONATOR_TOLERANCE

@@ -1,7 +1,5 @@
 """The checks in order, and what becomes of each."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from functools import partial

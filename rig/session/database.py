@@ -1,7 +1,5 @@
 """Creation and opening of a session's SQLite file, with checks for foreign files."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import sqlite3

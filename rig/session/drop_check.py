@@ -3,8 +3,6 @@
 All readers of drops, for results or for recovery, use this check.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, replace

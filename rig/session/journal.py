@@ -1,7 +1,5 @@
 """Journal of writes, kept in memory until they are on disk, so that a full disk loses no data."""
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager

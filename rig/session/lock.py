@@ -1,7 +1,5 @@
 """Writer lock of a session: an advisory lock that ends with its process."""
 
-from __future__ import annotations
-
 import errno
 import os
 import time

@@ -1,7 +1,5 @@
 """Reader of a session: raw records, the log of run states, and metadata."""
 
-from __future__ import annotations
-
 import hashlib
 import sqlite3
 from collections import deque

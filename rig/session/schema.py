@@ -3,8 +3,6 @@
 Triggers prevent changes of raw records.
 """
 
-from __future__ import annotations
-
 import json
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence

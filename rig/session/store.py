@@ -1,7 +1,5 @@
 """The session: an SQLite file with all records of an experiment, in order."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import logging
@@ -63,7 +61,7 @@ class Session(Reader, AbstractContextManager["Session"]):
         *,
         simulated: bool,
         origin: str,
-    ) -> Session:
+    ) -> Self:
         """Create a new session file and open it for writing.
 
         Parameters
@@ -96,7 +94,7 @@ class Session(Reader, AbstractContextManager["Session"]):
         return cls._connect(place, WriterLock(place), rows)
 
     @classmethod
-    def open(cls, path: str | os.PathLike[str], readonly: bool = False) -> Session:
+    def open(cls, path: str | os.PathLike[str], readonly: bool = False) -> Self:
         """Open an existing session.
 
         Parameters

@@ -1,16 +1,13 @@
 """The serial ports of this computer, and why each may or may not be a board's. Opens none."""
 
-from __future__ import annotations
-
 import os
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.boards import MEGA, PICO, UNO
 from rig.reasons import rig_error
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from serial.tools.list_ports_common import ListPortInfo
 
 
@@ -92,7 +89,7 @@ def serial_ports() -> list[SerialPort]:
     return sorted(ports, key=lambda port: (not port.candidate, port.path))
 
 
-def _describe(info: ListPortInfo) -> SerialPort:
+def _describe(info: "ListPortInfo") -> SerialPort:
     """Say what a port is and whether it may be a board's."""
     numbers = f"{info.vid or 0:04x}:{info.pid or 0:04x}"
     kinds = [kind for kind in KNOWN if numbers in kind.numbers]
