@@ -78,8 +78,10 @@ class Assembly:
 
     def sound(self) -> bool:
         """Whether every event and the certificate are in and agree."""
-        certificate = self.certificate
-        return certificate is not None and not self.missing() and self._crc() == certificate.crc32
+        if self.certificate is None or self.missing():
+            return False
+        events = map(self._events.__getitem__, range(self.certificate.events))
+        return zlib.crc32(wire.pack_events(events)) == self.certificate.crc32
 
     def forget_events(self, latest: int) -> None:
         """Drop the latest so many events, to read them again."""
@@ -99,14 +101,12 @@ class Assembly:
         Drop
             With a fault for everything that is not as it should be.
         """
-        run, attempt = wire.unpack_label(self.label)
         seen = self.certificate
         fire_tick = seen.fire_tick if seen else self.fire_tick
         # A device arms only with its gates clear, so 0 stands in where no certificate came.
         initial = seen.initial_state if seen else 0
         return Drop(
-            run=run,
-            attempt=attempt,
+            *wire.unpack_label(self.label),
             tick_hz=tick_hz,
             edges=self._edges(initial, fire_tick),
             fire_tick=fire_tick,
@@ -114,11 +114,6 @@ class Assembly:
             certificate=_account(seen) if seen else None,
             faults=tuple(self._faults(tick_hz)),
         )
-
-    def _crc(self) -> int:
-        """CRC-32 over all events, as they are on the wire; none is missing."""
-        total = self.certificate.events if self.certificate else 0
-        return zlib.crc32(wire.pack_events(map(self._events.__getitem__, range(total))))
 
     def _edges(self, state: int, fire_tick: int | None) -> tuple[Edge, ...]:
         if fire_tick is None:
@@ -142,7 +137,7 @@ class Assembly:
         if missing := self.missing():
             code = "events_overwritten" if missing[0] < self.first_kept else "events_missing"
             yield make_reason(code, missing=len(missing), events=seen.events, first=missing[0])
-        elif self._crc() != seen.crc32:
+        elif not self.sound():
             yield make_reason("crc_mismatch")
         if seen.overflows:
             yield make_reason("edges_lost", lost=seen.overflows)

@@ -18,7 +18,7 @@ from rig.reasons import rig_error
 
 Answer = TypeVar("Answer", bound=wire.DeviceMessage)
 
-_FIRST_WAIT_S = 0.1
+_WAIT_S = 0.1  # for the first answer
 _LONGEST_WAIT_S = 0.5
 _BACK_OFF = 1.5
 _PAST_SEQ = 255
@@ -90,11 +90,7 @@ class Exchange:
     _past: deque[tuple[int, bytes]] = field(default_factory=deque)  # what `abort_past` sent
 
     def request(
-        self,
-        message: wire.HostMessage,
-        expected: type[Answer],
-        tries: int | None = None,
-        wait: float = _FIRST_WAIT_S,
+        self, message: wire.HostMessage, kind: type[Answer], tries: int = 0, wait: float = _WAIT_S
     ) -> Answer:
         """Send a request until it is answered; every repeat has the same seq.
 
@@ -102,10 +98,10 @@ class Exchange:
         ----------
         message
             The request.
-        expected
+        kind
             Which message answers it.
         tries
-            How often to send it, if not as often as usual.
+            How often to send it; 0 for as often as usual.
         wait
             How long to wait for the first answer, s; longer from try to try.
 
@@ -132,7 +128,7 @@ class Exchange:
             self.write(data)
             answer = self.wait_for(wait, lambda got: got.ack == seq)
             wait = min(wait * _BACK_OFF, _LONGEST_WAIT_S)
-            if isinstance(answer, expected):
+            if isinstance(answer, kind):
                 return answer
             if isinstance(answer, wire.Refused):
                 raise DeviceRefusedError(answer.reason, answer.detail, self.transcript.disarmed)

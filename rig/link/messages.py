@@ -70,10 +70,8 @@ class UnsignedInt(NamedTuple):
 
     def unpack(self, payload: bytes, at: int) -> tuple[int, int]:
         """Read a value; give where the next one starts, too."""
-        value = payload[at : at + self.size]
-        if len(value) < self.size:
-            raise ValueError(f"{len(value)} bytes of records of {self.size}")
-        return int.from_bytes(value, "little"), at + self.size
+        value, end = Raw(self.size).unpack(payload, at)
+        return int.from_bytes(value, "little"), end
 
 
 class Raw(NamedTuple):

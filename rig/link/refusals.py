@@ -25,23 +25,18 @@ class DeviceRefusedError(DeviceError):
         if reason is not RefusalReason.NOT_ARMED:
             disarmed = None
         code = f"disarmed_{disarmed.name}" if disarmed else f"refused_{reason.name}"
-        why = make_reason(code.lower(), **_values(reason, detail))
+        channels = [n for n in range(GATES) if detail >> n & 1]
+        values: dict[RefusalReason, dict[str, object]] = {
+            RefusalReason.GATE_BLOCKED: {"channels": channels},
+            RefusalReason.GATE_UNSTEADY: {"channels": channels},
+            RefusalReason.HOLDING_A_DROP: {"run": detail},
+            RefusalReason.VERSION: {"firmware": detail, "program": PROTOCOL_VERSION},
+            RefusalReason.COOLING: {"rest_s": detail / 1000},
+            RefusalReason.NOT_KEPT: {"first": detail},
+        }
+        why = make_reason(code.lower(), **values.get(reason, {}))
         super().__init__(why.text, *remedies([why]))
         self.reasons = (why,)
         self.reason = reason
         self.detail = detail
         self.disarmed = disarmed
-
-
-def _values(reason: RefusalReason, detail: int) -> dict[str, object]:
-    """Return what the detail of a refusal says."""
-    channels = [n for n in range(GATES) if detail >> n & 1]
-    values: dict[RefusalReason, dict[str, object]] = {
-        RefusalReason.GATE_BLOCKED: {"channels": channels},
-        RefusalReason.GATE_UNSTEADY: {"channels": channels},
-        RefusalReason.HOLDING_A_DROP: {"run": detail},
-        RefusalReason.VERSION: {"firmware": detail, "program": PROTOCOL_VERSION},
-        RefusalReason.COOLING: {"rest_s": detail / 1000},
-        RefusalReason.NOT_KEPT: {"first": detail},
-    }
-    return values.get(reason, {})

@@ -20,11 +20,10 @@ from rig.recorder.opening import describe_session, latest_board, open_for
 from rig.recorder.published import PublishedState, link_state
 from rig.recorder.recorder import NullSink, Recorder
 from rig.records import Drop
-from rig.session.schema import RunState
+from rig.session.schema import VERDICTS, RunState
 from rig.session.store import Session
 
 log = logging.getLogger(__name__)
-_VERDICTS = (RunState.ACCEPTED, RunState.MARGINAL, RunState.VOID, RunState.REJECTED)
 
 
 class Controller:
@@ -359,7 +358,7 @@ class Controller:
         """
         last = self.session.latest_state(run)
         if (
-            state not in _VERDICTS
+            state not in VERDICTS
             or last is None
             or last.attempt != attempt
             or self.session.drop(run, attempt) is None

@@ -8,7 +8,7 @@ from statistics import stdev
 
 from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.link import messages as wire
-from rig.link.messages import DisarmReason, PulseEnd, RefusalReason
+from rig.link.messages import DisarmReason, RefusalReason
 from rig.selftest.board import BoardUnderTest, Check, RecordedDrop, name_gates
 from rig.selftest.checks import identify
 from rig.selftest.findings import fail_if, insist
@@ -94,12 +94,12 @@ class JudgeBoard(BoardUnderTest):
         for _ in range(max(1, board.options.drops // 4)):
             recorded, _ = self._pulse(board, STOP, 10_000, AT_STOP, **pulse)
             seal = recorded.certificate
-            insist("the stop in a pulse", PulseEnd(seal.pulse_end).name, "STOPPED")
+            insist("the stop in a pulse", seal.pulse_end.name, "STOPPED")
             ticks = seal.pulse_ticks - _changes(recorded, AT_STOP)[0]
             delays.append(1e6 / board.identity.tick_hz * ticks)
         worst = _limit("the stop acts after", delays, _STOP_LIMIT_US, "µs")
         recorded, _ = self._pulse(board, STOP, _SPIKE_US, AT_STOP, **pulse)
-        insist("a spike", PulseEnd(recorded.certificate.pulse_end).name, "ORDERED")
+        insist("a spike", recorded.certificate.pulse_end.name, "ORDERED")
         return f"after {worst:.0f} µs at most; {_SPIKE_US} µs are ignored"
 
     def open_stop(self, board: BoardUnderTest) -> None:

@@ -60,14 +60,10 @@ class ByteReplay:
         """Return the drops that the host acknowledged, without test runs."""
         return [told for told in self.records if isinstance(told, Drop) and told.run != TEST_RUN]
 
-    def unfinished_drops(self) -> list[Drop]:
-        """Return the received parts of drops that were never acknowledged, without test runs."""
-        return [drop for drop in self._transcript.unfinished_drops() if drop.run != TEST_RUN]
-
     def drops(self) -> dict[Job, Drop]:
-        """Return the latest version of every drop."""
-        drops = [*self.unfinished_drops(), *self.acknowledged_drops()]
-        return {drop.job: drop for drop in drops}
+        """Return the latest version of every drop, as far as it was received, without test runs."""
+        drops = [*self._transcript.unfinished_drops(), *self.acknowledged_drops()]
+        return {drop.job: drop for drop in drops if drop.run != TEST_RUN}
 
 
 def check_drop(stored: Drop, replayed: Mapping[Job, Drop]) -> Fate:

@@ -9,10 +9,11 @@ from datetime import datetime
 from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from rig.boards import GATES
 from rig.errors import RigError
+from rig.link.transcript import Direction
 from rig.reasons import Reason, rig_error
 from rig.records import ClockSample, Drop, HostBreak, Job, Pulse
 from rig.session.drop_check import ByteReplay, check_drop
@@ -22,9 +23,6 @@ from rig.session.rows import RowError, check_rows, drop_of, named_values
 from rig.session.schema import TABLES, Row, RunState, read_identity, read_reasons
 
 T = TypeVar("T")
-Direction = Literal["rx", "tx"]
-"""``rx``: from the device to the host; ``tx``: from the host to the device."""
-
 
 UNBLINDED = "unblinded"
 """The only key of the metadata that may be added later."""
@@ -195,10 +193,9 @@ class Reader:
         drops = (drop for drop in self.drops() if run in {None, drop.run})
         return [*{drop.run: drop for drop in sorted(drops, key=lambda drop: drop.job)}.values()]
 
-    def states(self, run: int | None = None, after: int = 0) -> list[StateEntry]:
-        """Return the log of run states in order, of all runs or of one, without the first few."""
-        which = "WHERE ?1 IS NULL OR run = ?1 ORDER BY id LIMIT -1 OFFSET ?2"
-        return [*self._records(_state, "run_state", which, run, after)]
+    def states(self, after: int = 0) -> list[StateEntry]:
+        """Return the log of run states in order, without the first `after`."""
+        return [*self._records(_state, "run_state", _AFTER, after)]
 
     def fired_ns(self) -> dict[tuple[int, int], int]:
         """Return the host time of firing from the log of states, by run and attempt."""

@@ -47,6 +47,10 @@ class RunState(StrEnum):
     INTERRUPTED = "interrupted"
 
 
+VERDICTS = (RunState.ACCEPTED, RunState.MARGINAL, RunState.VOID, RunState.REJECTED)
+"""States that judge a recorded drop."""
+
+
 class _Kind(NamedTuple):
     """A kind of value.
 

@@ -18,6 +18,7 @@ from typing import Self
 from rig import __version__
 from rig.errors import InputError, RigError, SessionError
 from rig.files import make_folder, state_folder
+from rig.link.transcript import Direction
 from rig.printable import encodable
 from rig.reasons import Reason, rig_error
 from rig.records import ClockSample, Drop, HostBreak, Pulse
@@ -26,7 +27,7 @@ from rig.session.faults import translate_errors
 from rig.session.journal import Journal
 from rig.session.lock import WriterLock
 from rig.session.presence import Presence
-from rig.session.reading import UNBLINDED, Direction, Reader
+from rig.session.reading import UNBLINDED, Reader
 from rig.session.rows import rows_of
 from rig.session.schema import TABLES, Record, RunState, write_reasons
 
