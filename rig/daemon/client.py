@@ -26,7 +26,7 @@ from rig.daemon.socket_path import check_folder
 from rig.errors import RigError
 from rig.reasons import Reason, errors_become, rig_error
 from rig.recorder.interrupts import Interrupts
-from rig.records import Drop
+from rig.records import Drop, Job
 from rig.session.reading import Reader
 from rig.session.schema import RunState
 from rig.session.store import Session
@@ -221,14 +221,12 @@ class Client:
             raise rig_error("no_session_open")
         return self._session
 
-    def open_session(
-        self, protocol: str, session: str, seed: int | None = None
-    ) -> tuple[int, int] | None:
+    def open_session(self, protocol: str, session: str, seed: int | None = None) -> Job | None:
         """Have a session opened, and open it for reading here."""
         source, path = str(Path(protocol).resolve()), Path(session).resolve()
         opened = self.call("open_session", protocol=source, session=str(path), seed=seed)
         self._session, fetched = Session.open(path, readonly=True), opened["fetched"]
-        return None if fetched is None else (fetched[0], fetched[1])
+        return fetched and Job(*fetched)
 
     def close_session(self) -> None:
         """Have the session closed."""

@@ -29,6 +29,7 @@ from typing import Annotated, Any, NamedTuple, TypeAlias, dataclass_transform
 from rig.boards import Capabilities
 from rig.errors import DeviceError
 from rig.link.frames import PAYLOAD_LIMIT
+from rig.records import Job
 
 PROTOCOL_VERSION = 2
 HOST_SILENCE_MS = 250
@@ -531,7 +532,7 @@ def pack_label(run: int, attempt: int) -> int:
     return run | attempt << 16
 
 
-def unpack_label(label: int) -> tuple[int, int]:
+def unpack_label(label: int) -> Job:
     """Undo `pack_label`.
 
     Parameters
@@ -541,7 +542,7 @@ def unpack_label(label: int) -> tuple[int, int]:
 
     Returns
     -------
-    int, int
+    Job
         Run and attempt.
     """
-    return label & 0xFFFF, label >> 16
+    return Job(label & 0xFFFF, label >> 16)

@@ -19,7 +19,7 @@ from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
 from rig.recorder.opening import describe_session, latest_board, open_for
 from rig.recorder.published import PublishedState, link_state
 from rig.recorder.recorder import NullSink, Recorder
-from rig.records import Drop
+from rig.records import Drop, Job
 from rig.session.schema import VERDICTS, RunState
 from rig.session.store import Session
 
@@ -54,7 +54,7 @@ class Controller:
         self.url = url
         self.published = published
         self.recorder: Recorder | None = None
-        self.due: tuple[int, int] | None = None
+        self.due: Job | None = None
         self._halted = halted
         self._keep_port = not is_simulated(url)  # between sessions
         self.opened: Session | None = None
@@ -62,7 +62,7 @@ class Controller:
         self._line_url = url  # with all that a simulation is told
         self._locator = BoardLocator(url)
         self._unarmed: RigError | None = None  # why what was armed is not
-        self._lost: dict[tuple[int, int], RigError] = {}  # why a drop is not in the session
+        self._lost: dict[Job, RigError] = {}  # why a drop is not in the session
 
     # ------------------------------------------------------------------ sessions
 
@@ -80,13 +80,11 @@ class Controller:
         return self.opened
 
     @property
-    def armed(self) -> tuple[int, int] | None:
+    def armed(self) -> Job | None:
         """Run and attempt of the drop that waits for `fire`."""
         return None if self.recorder is None else self.recorder.armed
 
-    def open_session(
-        self, protocol: str, session: str, seed: int | None = None
-    ) -> tuple[int, int] | None:
+    def open_session(self, protocol: str, session: str, seed: int | None = None) -> Job | None:
         """Make a session or go on with one, connect, and settle what was left behind.
 
         Parameters
@@ -98,8 +96,8 @@ class Controller:
 
         Returns
         -------
-        tuple of int, or None
-            Run and attempt of a drop that was fetched from the device.
+        Job or None
+            Of a drop that was fetched from the device.
 
         Raises
         ------
@@ -208,13 +206,13 @@ class Controller:
         if recorder is not None:
             recorder.let_go()
 
-    def settle(self) -> tuple[int, int] | None:
+    def settle(self) -> Job | None:
         """Settle what an earlier connection left: a drop the device holds, a run without a record.
 
         Returns
         -------
-        tuple of int, or None
-            Run and attempt of the drop that was fetched.
+        Job or None
+            Of the drop that was fetched.
 
         Raises
         ------
@@ -223,21 +221,20 @@ class Controller:
         """
         recorder = self._require_recorder()
         held = recorder.held()
-        if held is not None and held[0] == TEST_RUN:
+        if held is not None and held.run == TEST_RUN:
             release_test.forget(recorder)
             held = None
         if held is not None:
             if held not in self.session.fired_ns():
-                run, attempt = held
-                raise rig_error("drop_of_another_session", run=run, attempt=attempt)
-            recorder.collect(*held, fresh=False)
+                raise rig_error("drop_of_another_session", **held._asdict())
+            recorder.collect(held, fresh=False)
             self._lost.pop(held, None)
         latest = {entry.run: entry for entry in self.session.states()}
         for run, attempt, state, *_ in latest.values():
             is_begun = state in {RunState.ARMED, RunState.FIRED}
             if is_begun and self.session.drop(run, attempt) is None:
                 why = (make_reason("connection_ended"),)
-                recorder.state(run, attempt, RunState.INTERRUPTED, why)
+                recorder.state(Job(run, attempt), RunState.INTERRUPTED, why)
         return held
 
     # ------------------------------------------------------------------ drops
@@ -268,7 +265,7 @@ class Controller:
             raise rig_error("not_next", run=run, attempt=attempt)
         self.session.require_presence()
         self._unarmed = None
-        return recorder.arm(run, attempt, protocol)
+        return recorder.arm(Job(run, attempt), protocol)
 
     def notice(self) -> None:
         """Log that the device has disarmed itself, when it has."""
@@ -310,7 +307,7 @@ class Controller:
             return
         due = self.due
         try:
-            self._require_recorder().collect(*due)
+            self._require_recorder().collect(due)
         except RigError as error:
             self._lost[due] = error
             raise
@@ -329,7 +326,7 @@ class Controller:
         drop = self.session.drop(run, attempt)
         if drop is None:
             missing = rig_error("not_recorded", run=run, attempt=attempt)
-            raise self._lost.get((run, attempt)) or missing
+            raise self._lost.get(Job(run, attempt)) or missing
         return drop
 
     def test_release(self) -> dict[str, Any]:
@@ -365,7 +362,7 @@ class Controller:
         ):
             raise rig_error("cannot_judge", run=run, attempt=attempt, state=state)
         if (last.state, last.reasons) != (state, reasons):
-            self._require_recorder().state(run, attempt, state, reasons)
+            self._require_recorder().state(Job(run, attempt), state, reasons)
             self.session.settle()
 
     def stop(self, reason: Reason | str) -> None:
@@ -386,7 +383,7 @@ class Controller:
             recorder.abort()
         finally:
             if armed is not None:
-                recorder.state(*armed, RunState.INTERRUPTED, (why,))
+                recorder.state(armed, RunState.INTERRUPTED, (why,))
 
     def close(self) -> None:
         """Close session and port."""

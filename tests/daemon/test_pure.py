@@ -32,7 +32,7 @@ from rig.recorder.feed import StateFeed
 from rig.recorder.interrupts import Interrupts
 from rig.recorder.published import EDGES_LIMIT, PublishedState
 from rig.recorder.recorder import NullSink
-from rig.records import Drop, Edge
+from rig.records import Drop, Edge, Job
 from rig.session.schema import RunState
 from tests.refusals import refused
 from tests.tables import cases, read_table
@@ -234,7 +234,7 @@ def test_what_falls_is_shown_while_it_falls_and_frames_out_of_order_are_not():
     published = PublishedState()
     published.plan([{"run": 1}])
     feed, label = StateFeed(published), wire.pack_label(1, 1)
-    feed.state(1, 1, RunState.ARMED, ())
+    feed.state(Job(1, 1), RunState.ARMED, ())
     frames = [(0, (110, 1)), (3, (140, 1), (150, 3)), (1, (120, 0))]
     events = [wire.EventsFrame(label, at, wire.pack_events(of)) for at, *of in frames]
     for message in (events[0], wire.Fired(100), *events):
@@ -246,11 +246,11 @@ def test_what_falls_is_shown_while_it_falls_and_frames_out_of_order_are_not():
     feed.show_drop(Drop(1, 1, 1000, (Edge(10, 0, True), Edge(20, 0, False)), 100))
     assert published.get("phase") == "idle"
     assert published.snapshot()["state"]["edges"] == [(10, 0, 1), (20, 0, 0)]
-    feed.state(1, 2, RunState.ARMED, ())
+    feed.state(Job(1, 2), RunState.ARMED, ())
     assert published.snapshot()["state"]["edges"] == []
     feed.know(Incoming(0, 0, wire.Disarmed(1, DisarmReason.TIMEOUT)))
     assert published.get("phase") == "idle"
-    feed.state(1, 2, RunState.INTERRUPTED, ())
+    feed.state(Job(1, 2), RunState.INTERRUPTED, ())
     state = published.snapshot()["state"]
     assert state["drop"]["state"] == state["runs"][0]["state"] == "interrupted"
 
