@@ -374,8 +374,7 @@ def _reach(path: Path) -> socket.socket:
             line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, patience)
             line.connect(str(path))
         except BlockingIOError as error:
-            busy = rig_error("daemon_busy", path=path, patience_s=_REACH_S)
-            raise busy from error
+            raise rig_error("daemon_busy", path=path, patience_s=_REACH_S) from error
         except OSError as error:
             raise rig_error("no_daemon", path=path, text=error) from error
         stack.pop_all()

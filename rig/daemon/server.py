@@ -8,6 +8,7 @@ import socket
 import sys
 from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,7 @@ _LOOK_S = LEASE_S / 20
 """Between two looks whether control has lapsed, the worker goes on, and clients find the socket."""
 
 
+@dataclass(eq=False, repr=False)
 class Server:
     """One daemon.
 
@@ -50,25 +52,19 @@ class Server:
         What else follows the published state in the server's loop; it must not fail.
     """
 
-    def __init__(
-        self,
-        url: str,
-        path: Path,
-        *,
-        idle_s: float | None = None,
-        onlookers: Sequence[Onlooker] = (),
-    ) -> None:
-        self.url = url
-        self.path = path
-        self.service = Service(url)
+    url: str
+    path: Path
+    idle_s: float | None = None
+    onlookers: Sequence[Onlooker] = ()
+    _turns: asyncio.Lock = field(default_factory=asyncio.Lock)
+    _left_at: float = 0.0  # when somebody was there last, or something under way
+    _stall: dict[str, Any] | None = None  # as published
+    _serving: set[asyncio.Task[None]] = field(default_factory=set)
+    _over: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def __post_init__(self) -> None:
+        self.service = Service(self.url)
         self.published, self._worker = self.service.published, self.service.worker
-        self._turns = asyncio.Lock()
-        self._idle_s = idle_s
-        self._onlookers = onlookers
-        self._left_at = 0.0  # when somebody was there last, or something under way
-        self._stall: dict[str, Any] | None = None  # as published
-        self._serving: set[asyncio.Task[None]] = set()
-        self._over = asyncio.Event()
 
     async def run(self, ready: Callable[[], None]) -> None:
         """Serve until a signal comes, or until nobody needs it.
@@ -103,7 +99,7 @@ class Server:
             self._accept(door.listener),
             self.service.publisher.run(),
             self._watch(door),
-            *(onlooker(self.published) for onlooker in self._onlookers),
+            *(onlooker(self.published) for onlooker in self.onlookers),
         ]
         tasks = [asyncio.ensure_future(part) for part in parts]
         try:
@@ -210,6 +206,6 @@ class Server:
             or error.get("kind") == "SessionError"
         ):
             self._left_at = now
-        elif self._idle_s is not None and now - self._left_at >= self._idle_s:
-            log.info("no client for %g s; nothing armed, falling or unsaved", self._idle_s)
+        elif self.idle_s is not None and now - self._left_at >= self.idle_s:
+            log.info("no client for %g s; nothing armed, falling or unsaved", self.idle_s)
             self.end()

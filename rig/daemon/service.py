@@ -2,7 +2,6 @@
 
 import asyncio
 import logging
-import os
 from collections.abc import Callable
 from functools import partial
 from inspect import isawaitable
@@ -148,14 +147,8 @@ def _hello(service: Service, caller: Connection, api: object, client: str) -> di
         caller.is_client = others < CLIENTS
         service.publisher.count()
     caller.name = one_line(client, 80) or "a client"
-    port = service.published.get("port")
-    return {
-        "api": rpc.API,
-        "version": __version__,
-        "pid": os.getpid(),
-        "port": port["url"],
-        "path": port["path"],
-    }
+    daemon, port = service.published.get("daemon"), service.published.get("port")
+    return {**daemon, "port": port["url"], "path": port["path"]}
 
 
 def _take_control(service: Service, client: Connection) -> None:

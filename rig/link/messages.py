@@ -320,6 +320,12 @@ class State(DeviceMessage, code=0x83):
     label: U32
     events: U16
 
+    @property
+    def drop(self) -> Job | None:
+        """The drop that it records or holds; `None` where there is none."""
+        has_drop = self.phase in {Phase.RECORDING, Phase.HOLDING}
+        return unpack_label(self.label) if has_drop else None
+
 
 class Armed(DeviceMessage, code=0x84):
     """Answer to ARM."""

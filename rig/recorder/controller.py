@@ -220,7 +220,7 @@ class Controller:
             The device holds a drop of another session, or is in trouble.
         """
         recorder = self._require_recorder()
-        held = recorder.held()
+        held = recorder.device.status().drop
         if held is not None and held.run == TEST_RUN:
             release_test.forget(recorder)
             held = None
@@ -353,13 +353,8 @@ class Controller:
         InputError
             No such drop, or no verdict.
         """
-        last = self.session.latest_state(run)
-        if (
-            state not in VERDICTS
-            or last is None
-            or last.attempt != attempt
-            or self.session.drop(run, attempt) is None
-        ):
+        last, drop = self.session.latest_state(run), self.session.drop(run, attempt)
+        if last is None or drop is None or last.attempt != attempt or state not in VERDICTS:
             raise rig_error("cannot_judge", run=run, attempt=attempt, state=state)
         if (last.state, last.reasons) != (state, reasons):
             self._require_recorder().state(Job(run, attempt), state, reasons)

@@ -9,7 +9,7 @@ from typing import Any
 from rig.clock.host import HostWatch, SystemClock
 from rig.errors import DeviceError, SessionError, StoppedError
 from rig.link.client import BOOT_WAIT_S, Device
-from rig.link.messages import Arm, Identity, Phase, pack_label, unpack_label
+from rig.link.messages import Arm, Identity, pack_label
 from rig.link.port import Port, open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Direction, Record
@@ -184,13 +184,6 @@ class Recorder:
         return self.device.statistics() | {
             "round_trip_s": None if trip is None else (trip.host_recv_ns - trip.host_send_ns) * 1e-9
         }
-
-    def held(self) -> Job | None:
-        """Run and attempt of a drop the device still holds, or `None`."""
-        state = self.device.status()
-        if state.phase in {Phase.HOLDING, Phase.RECORDING}:
-            return unpack_label(state.label)
-        return None
 
     def arm(self, job: Job, protocol: Protocol) -> int:
         """Prepare a drop; the release stays off until `fire`. Until then wait with `wait` only.

@@ -10,7 +10,7 @@ from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.exchange import Answer
 from rig.link.frames import Frame, encode
-from rig.link.messages import TEST_RUN, DisarmReason, Phase, RefusalReason, pack_label, unpack_label
+from rig.link.messages import TEST_RUN, DisarmReason, Phase, RefusalReason, pack_label
 from rig.link.port import Port, port_clock
 from rig.link.transcript import Record
 from rig.reasons import error_of, make_reason, rig_error
@@ -159,10 +159,8 @@ class BoardUnderTest(Device):
 
     def foreign_drop(self) -> dict[str, int]:
         """Give run and attempt of a session's drop that the board has; empty without one."""
-        state = self.state()
-        run, attempt = unpack_label(state.label)
-        busy = state.phase in {Phase.RECORDING, Phase.HOLDING} and run != TEST_RUN
-        return {"run": run, "attempt": attempt} if busy else {}
+        drop = self.state().drop
+        return {} if drop is None or drop.run == TEST_RUN else drop._asdict()
 
     def settle(self) -> None:
         """Bring the board to IDLE, and let it forget a drop of a self-test.

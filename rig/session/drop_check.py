@@ -12,7 +12,7 @@ from typing import Any
 
 from rig.link.messages import TEST_RUN, pack_events
 from rig.link.transcript import Direction, Incoming, Restart, Transcript
-from rig.records import Certificate, ClockSample, Drop, Edge, Job, Pulse
+from rig.records import Certificate, ClockSample, Drop, Job, Pulse
 
 _LATER = [field.name for field in fields(Certificate) if field.default is None]
 """Fields that certificates of older formats do not have."""
@@ -122,14 +122,9 @@ def _account_holds(drop: Drop, seen: Certificate) -> bool | None:
         return False
     if len(events) < seen.events or drop.fire_tick is None:
         return None
-    return _crc32(drop, drop.fire_tick, events) == seen.crc32
-
-
-def _crc32(drop: Drop, fire_tick: int, events: Iterable[tuple[int, list[Edge]]]) -> int:
-    """Return the CRC-32 of the events of these edges, see `rig.link.assembly.edges`."""
     state, snapshots = drop.initial_state, []
-    for tick, edges in events:
+    for tick, edges in events:  # what `rig.link.assembly.edges` makes of them, undone
         for _, channel, blocked in edges:
             state = state | 1 << channel if blocked else state & ~(1 << channel)
-        snapshots.append(((fire_tick + tick) & 0xFFFF_FFFF, state))
-    return zlib.crc32(pack_events(snapshots))
+        snapshots.append(((drop.fire_tick + tick) & 0xFFFF_FFFF, state))
+    return zlib.crc32(pack_events(snapshots)) == seen.crc32
