@@ -119,15 +119,13 @@ class Line:
     def _read(self) -> None:
         over = rig_error("daemon_gone", text="it hung up")
         try:
-            with self._socket.makefile("rb") as stream:
+            with errors_become("daemon_gone", OSError), self._socket.makefile("rb") as stream:
                 while (line := stream.readline(rpc.MESSAGE_LIMIT)).endswith(b"\n"):
                     with errors_become("not_a_daemon", ValueError, msgspec.ValidationError):
                         message = msgspec.convert(json.loads(line), dict[str, Any])
                     self._take(message)
         except RigError as error:
             over = error
-        except OSError as error:
-            over = rig_error("daemon_gone", text=error)
         finally:
             with self._guard:
                 self._over, unanswered = over, [*self._open.values()]

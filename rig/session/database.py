@@ -104,9 +104,8 @@ def copy_session(path: Path, folder: Path) -> Path:
     OSError
         It cannot be read, or there is no room for it.
     """
-    copy = folder / "copy"
+    copy = shutil.copyfile(path, folder / "copy")
     log = beside(path, "-wal")
-    shutil.copyfile(path, copy)
     if log.is_file() and log.stat().st_size:
         shutil.copyfile(log, folder / "copy-wal")
     return copy

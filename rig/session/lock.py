@@ -47,8 +47,7 @@ class WriterLock:
             if has_fcntl:  # on other systems a locked file cannot be written
                 self.path.write_text(f"{os.getpid()}\n", "ascii")
         except Timeout:
-            holder = _holder(self.path)
-            raise rig_error("session_in_use", path=session, holder=holder) from None
+            raise rig_error("session_in_use", path=session, holder=_holder(self.path)) from None
         except SessionError:
             raise
         except OSError as error:

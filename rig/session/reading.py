@@ -30,8 +30,6 @@ MOST_EDGES = 1 << 22
 """Most edges of a drop without a certificate: no working timer gives more in an hour."""
 _AT_ONCE = 1024
 """Rows fetched at once."""
-_AFTER = "WHERE id > ? ORDER BY id"
-"""SQL for the rows after a given number: rows are never deleted, so numbers have no gaps."""
 _ALWAYS = {"created", "rig_version", "simulated", "origin", "protocol_sha256"}
 
 
@@ -150,23 +148,23 @@ class Reader:
 
         The iterator reads them lazily.
         """
-        return self._records(ByteChunk, "bytes", _AFTER, after)
+        return self._records(ByteChunk, "bytes", after)
 
     def pings(self, after: int = 0) -> list[ClockSample]:
         """Return the clock samples in order, without the first `after`."""
-        return [*self._records(ClockSample, "ping", _AFTER, after)]
+        return [*self._records(ClockSample, "ping", after)]
 
     def pulses(self) -> list[Pulse]:
         """Return all recorded pulses of the 1 Hz reference, in order."""
-        return [*self._records(Pulse, "reference", _AFTER, 0)]
+        return [*self._records(Pulse, "reference")]
 
     def host_breaks(self) -> list[HostBreak]:
         """Return all breaks of the host's clock (sleep, or clock set), in order."""
-        return [*self._records(HostBreak, "host_break", _AFTER, 0)]
+        return [*self._records(HostBreak, "host_break")]
 
     def attached_files(self) -> list[AttachedFile]:
         """Return all attached files, in order."""
-        return [*self._records(AttachedFile, "attachment", _AFTER, 0)]
+        return [*self._records(AttachedFile, "attachment")]
 
     def drops(self, replay: ByteReplay | None = None) -> Iterator[Drop]:
         """Return all recorded drops in the order of recording, checked against their bytes.
@@ -195,7 +193,7 @@ class Reader:
 
     def states(self, after: int = 0) -> list[StateEntry]:
         """Return the log of run states in order, without the first `after`."""
-        return [*self._records(_state, "run_state", _AFTER, after)]
+        return [*self._records(_state, "run_state", after)]
 
     def fired_ns(self) -> dict[tuple[int, int], int]:
         """Return the host time of firing from the log of states, by run and attempt."""
@@ -203,8 +201,8 @@ class Reader:
 
     def latest_state(self, run: int) -> StateEntry | None:
         """Return the latest state of a run; `None` if it has none."""
-        which = "WHERE run = ? ORDER BY id DESC LIMIT 1"
-        return next(self._records(_state, "run_state", which, run), None)
+        rows = self._rows("run_state", "WHERE run = ? ORDER BY id DESC LIMIT 1", run)
+        return next((_state(*row[1:]) for row in rows), None)
 
     def check(self) -> None:
         """Read all records once.
@@ -254,10 +252,11 @@ class Reader:
             self._check(table, rows)
             yield from rows
 
-    def _records(
-        self, kind: Callable[..., T], table: str, which: str, *args: object
-    ) -> Iterator[T]:
-        return (kind(*row[1:]) for row in self._rows(table, which, *args))
+    def _records(self, kind: Callable[..., T], table: str, after: int = 0) -> Iterator[T]:
+        """Return the records of a table in order, without the first `after`."""
+        # Rows are never deleted, so their numbers have no gaps.
+        rows = self._rows(table, "WHERE id > ? ORDER BY id", after)
+        return (kind(*row[1:]) for row in rows)
 
     def _check(self, table: str, rows: Sequence[Row]) -> None:
         try:
