@@ -58,7 +58,7 @@ def drive(recorder: Recorder, protocol: Protocol, halted: Callable[[], bool]) ->
         "release_sense_s": None if sensed is None else sensed / drop.tick_hz,
         "edges": len(drop.edges),
         "gates": sorted({edge.channel for edge in drop.edges}),
-        "faults": list(drop.faults),
+        "faults": [fault.text for fault in drop.faults],
     }
 
 
