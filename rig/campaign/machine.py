@@ -295,9 +295,8 @@ class Flow:
 
     def to(self, stage: Stage, trouble: str = "") -> "Flow":
         """Go to another stage; answers to earlier effects count no more."""
-        return replace(
-            self, stage=stage, ticket=self.ticket + 1, trouble=trouble, home=Stage.PREPARE
-        )
+        ticket = self.ticket + 1
+        return replace(self, stage=stage, ticket=ticket, trouble=trouble, home=Stage.PREPARE)
 
 
 def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an event

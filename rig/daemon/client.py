@@ -24,11 +24,11 @@ from rig.daemon.lease import LEASE_S
 from rig.daemon.replica import Replica
 from rig.daemon.socket_path import check_folder
 from rig.errors import RigError
-from rig.reasons import Reason, errors_become, rig_error
+from rig.reasons import errors_become, rig_error
 from rig.recorder.interrupts import Interrupts
 from rig.records import Drop, Job
 from rig.session.reading import Reader
-from rig.session.schema import RunState
+from rig.session.schema import Reasons, RunState
 from rig.session.store import Session
 
 HELLO_S = 10.0
@@ -254,9 +254,7 @@ class Client:
             raise rig_error("not_recorded", run=run, attempt=attempt)
         return drop
 
-    def log_state(
-        self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...] = ()
-    ) -> None:
+    def log_state(self, run: int, attempt: int, state: RunState, reasons: Reasons = ()) -> None:
         """Log a verdict."""
         records = [reason.record() for reason in reasons]
         self.call("log_state", run=run, attempt=attempt, state=str(state), reasons=records)

@@ -153,9 +153,8 @@ class Server:
             line.close()
             return
         reader, writer = await asyncio.open_connection(sock=line, limit=rpc.REQUEST_LIMIT)
-        connection = Connection(
-            reader, writer, self.service.do, self.service.lease.heard, self._turns
-        )
+        do, heard = self.service.do, self.service.lease.heard
+        connection = Connection(reader, writer, do, heard, self._turns)
         self.service.connections.add(connection)
         late = loop.call_later(HELLO_S, connection.hurry)
         try:

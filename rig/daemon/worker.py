@@ -90,14 +90,12 @@ class Worker:
         if self._thread.ident is None:
             self._thread.start()
 
-    def submit(
-        self, work: Callable[[Controller], Any], holder: object, *, writes: bool = True
-    ) -> Future[Any]:
+    def submit(self, do: Callable[..., Any], holder: object, *, writes: bool = True) -> Future[Any]:
         """Have something done, when what was asked for before is done.
 
         Parameters
         ----------
-        work
+        do
             Called with the controller, in the worker's thread.
         holder
             The client that must be in control at that moment.
@@ -110,7 +108,7 @@ class Worker:
             self._holder = holder
             if writes and isinstance(self._trouble, SessionError):
                 raise self._trouble
-            return work(self.controller)
+            return do(self.controller)
 
         outcome: Future[Any] = Future()
         self._jobs.put(_Job(in_control, outcome))

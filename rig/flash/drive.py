@@ -8,7 +8,7 @@ from contextlib import closing
 from pathlib import Path
 
 from rig.errors import DeviceError
-from rig.flash.boards import DRIVE
+from rig.flash.boards import DRIVE, Say
 from rig.flash.image import Image
 from rig.link import messages as wire
 from rig.link.client import Device
@@ -50,9 +50,7 @@ def pico_ports() -> set[str]:
     return {p.path for p in serial_ports() if p.candidate and DRIVE.board.name in p.kinds}
 
 
-def copy_firmware(
-    port: str | None, folder: str | None, image: Image, say: Callable[[str], None]
-) -> str:
+def copy_firmware(port: str | None, folder: str | None, image: Image, say: Say) -> str:
     """Copy firmware to a Pico's drive. It takes it block by block and restarts at the last.
 
     Parameters
@@ -103,7 +101,7 @@ def copy_firmware(
     raise rig_error("no_pico_port")
 
 
-def _ask_to_wait(port: str | None, say: Callable[[str], None]) -> None:
+def _ask_to_wait(port: str | None, say: Say) -> None:
     """Ask the one Pico that runs to take firmware, which it does when it has nothing else to do."""
     paths = [port] if port else [*pico_ports()]
     if len(paths) != 1:

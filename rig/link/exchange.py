@@ -177,9 +177,8 @@ class Exchange:
             data = self.port.read(min(max(1, self.port.in_waiting), _AT_ONCE))
         self.rx_bytes += len(data)
         if self.rx_bytes > STRANGE_BYTES and self.transcript.identity is None:
-            lacking = (
-                "and no word of who is there" if self.transcript.rx.good else "that are no frames"
-            )
+            good = self.transcript.rx.good
+            lacking = "and no word of who is there" if good else "that are no frames"
             raise rig_error("bytes_strange", size_mb=self.rx_bytes / 1e6, lacking=lacking)
         self._part += data
         # A line gives single bytes, and half a frame says nothing.

@@ -443,9 +443,8 @@ class DropCertificate2(DropCertificate, code=0x8D):
 def _wire_fields(message: type[Any]) -> tuple[Field, ...]:
     """List a message's fields in wire order."""
     hints = typing.get_type_hints(message, include_extras=True)
-    return tuple(
-        Field(field.name, *typing.get_args(hints[field.name])[:2]) for field in fields(message)
-    )
+    names = [field.name for field in fields(message)]
+    return tuple(Field(name, *typing.get_args(hints[name])[:2]) for name in names)
 
 
 CODES = {message: code for code, message in TABLE.items()}

@@ -19,9 +19,7 @@ class DeviceRefusedError(DeviceError):
         Why the device had disarmed itself before, where that is the cause: it is not armed.
     """
 
-    def __init__(
-        self, reason: RefusalReason, detail: int, disarmed: DisarmReason | None = None
-    ) -> None:
+    def __init__(self, reason: RefusalReason, detail: int, disarmed: DisarmReason | None = None):
         if reason is not RefusalReason.NOT_ARMED:
             disarmed = None
         code = f"disarmed_{disarmed.name}" if disarmed else f"refused_{reason.name}"

@@ -20,7 +20,7 @@ from rig.recorder.opening import describe_session, latest_board, open_for
 from rig.recorder.published import PublishedState, link_state
 from rig.recorder.recorder import NullSink, Recorder
 from rig.records import Drop, Job
-from rig.session.schema import VERDICTS, RunState
+from rig.session.schema import VERDICTS, Reasons, RunState
 from rig.session.store import Session
 
 log = logging.getLogger(__name__)
@@ -190,11 +190,8 @@ class Controller:
         sink = NullSink() if self.opened is None else self.opened
         published, meet = self.published, self._locator.meet
         self.recorder = Recorder(sink, url, published, self._halted, meet, port)
-        published.set(
-            port={"url": self.url, "simulated": is_simulated(url), "path": self._locator.path},
-            link=link_state("up"),
-            phase="idle",
-        )
+        place = {"url": self.url, "simulated": is_simulated(url), "path": self._locator.path}
+        published.set(port=place, link=link_state("up"), phase="idle")
         identity = self.recorder.identity
         if port is None:
             log.info("up: %s, id %s", identity.board, identity.unique_id.hex())
@@ -270,12 +267,11 @@ class Controller:
     def notice(self) -> None:
         """Log that the device has disarmed itself, when it has."""
         recorder = self.recorder
-        if recorder is not None and recorder.armed is not None:
-            reason = recorder.device.transcript.disarmed
-            if reason is not None:
-                refusal = DeviceRefusedError(RefusalReason.NOT_ARMED, 0, reason)
-                self.stop(*refusal.reasons)
-                self._unarmed = refusal
+        reason = recorder.device.transcript.disarmed if recorder and recorder.armed else None
+        if reason is not None:
+            refusal = DeviceRefusedError(RefusalReason.NOT_ARMED, 0, reason)
+            self.stop(*refusal.reasons)
+            self._unarmed = refusal
 
     def fire(self, token: int) -> None:
         """Let go. From here on the drop is collected whatever happens: call `finish`.
@@ -303,16 +299,14 @@ class Controller:
         RigError
             It could not be read or stored: the device still has it.
         """
-        if self.due is None:
+        due, self.due = self.due, None
+        if due is None:
             return
-        due = self.due
         try:
             self._require_recorder().collect(due)
         except RigError as error:
             self._lost[due] = error
             raise
-        finally:
-            self.due = None
 
     def collect(self, run: int, attempt: int) -> Drop:
         """Return a drop that fell, once it is in the session.
@@ -343,9 +337,7 @@ class Controller:
         self.published.set(release_test=result)
         return result
 
-    def log_state(
-        self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...] = ()
-    ) -> None:
+    def log_state(self, run: int, attempt: int, state: RunState, reasons: Reasons = ()) -> None:
         """Log a verdict on a recorded drop.
 
         Raises

@@ -10,7 +10,7 @@ from rig.link.transcript import Incoming, Record
 from rig.reasons import Reason, reasons_json
 from rig.recorder.published import PublishedState
 from rig.records import Drop, Edge, Job
-from rig.session.schema import RunState
+from rig.session.schema import Reasons, RunState
 
 _PHASES = dict(zip(wire.Phase, ("idle", "armed", "recording", "storing"), strict=True))
 
@@ -50,7 +50,7 @@ class StateFeed:
             case wire.DropCertificate():
                 self._published.set(phase="storing")
 
-    def state(self, job: Job, state: RunState, reasons: tuple[Reason, ...]) -> None:
+    def state(self, job: Job, state: RunState, reasons: Reasons) -> None:
         """Take a line of the log of run states."""
         why = reasons_json(reasons, Reason.record)
         self._published.run(job.run, attempt=job.attempt, state=str(state), **why)

@@ -20,11 +20,7 @@ def link_state(state: str, error: object = None, retry_s: float | None = None) -
 
 
 _SHOWN = "daemon port device statistics gates drop release_test session control error"
-_FIRST: dict[str, Any] = dict.fromkeys(_SHOWN.split()) | {
-    "link": link_state("closed"),
-    "phase": "idle",
-    "clients": 0,
-}
+_FIRST: dict[str, Any] = {"link": link_state("closed"), "phase": "idle", "clients": 0}
 
 Edge3 = tuple[int, int, int]
 """Tick, channel, blocked."""
@@ -45,7 +41,7 @@ class PublishedState:
         self.changed: Callable[[], object] = lambda: None
         self.watched = False
         self._guard = threading.Lock()
-        self._sections = dict(_FIRST)
+        self._sections = dict.fromkeys(_SHOWN.split()) | _FIRST
         self._phase = "idle"  # of the device
         self._runs: dict[int, dict[str, Any]] = {}
         self._edges: list[Edge3] = []

@@ -16,11 +16,11 @@ from rig.link.transcript import Direction, Record
 from rig.ports import told
 from rig.protocol.measurable import record_ms
 from rig.protocol.protocol import Protocol
-from rig.reasons import Reason, rig_error, sentences
+from rig.reasons import rig_error, sentences
 from rig.recorder.feed import StateFeed
 from rig.recorder.published import PublishedState
 from rig.records import ClockSample, Drop, Job, Pulse
-from rig.session.schema import RunState
+from rig.session.schema import Reasons, RunState
 from rig.session.store import Session
 
 log = logging.getLogger(__name__)
@@ -180,10 +180,9 @@ class Recorder:
 
     def statistics(self) -> dict[str, object]:
         """Count what went over the line since it is up, see rig/daemon/API.md."""
-        trip = self._sample
-        return self.device.statistics() | {
-            "round_trip_s": None if trip is None else (trip.host_recv_ns - trip.host_send_ns) * 1e-9
-        }
+        sample = self._sample
+        trip_s = (sample.host_recv_ns - sample.host_send_ns) * 1e-9 if sample else None
+        return self.device.statistics() | {"round_trip_s": trip_s}
 
     def arm(self, job: Job, protocol: Protocol) -> int:
         """Prepare a drop; the release stays off until `fire`. Until then wait with `wait` only.
@@ -272,7 +271,7 @@ class Recorder:
         finally:
             self._disk_must_not_matter = False
 
-    def state(self, job: Job, state: RunState, reasons: tuple[Reason, ...] = ()) -> None:
+    def state(self, job: Job, state: RunState, reasons: Reasons = ()) -> None:
         """Log where a run stands, on the disk when this returns."""
         self.session.add_state(*job, state, self.clock.now_ns(), reasons)
         self.session.commit()
@@ -301,9 +300,9 @@ class Recorder:
             self._is_endable = False
 
     def _give_way(self) -> None:
-        is_halted = self._halted()  # also tells whoever owns this that the device is waited for
-        if is_halted and self._is_endable:
-            self.go_on()
+        # To ask also tells whoever owns this that the device is waited for.
+        if self._halted() and self._is_endable:
+            raise rig_error("switched_off")
 
     def _log(self, direction: Direction, host_ns: int, data: bytes) -> None:
         try:

@@ -14,13 +14,13 @@ from typing import Any, NamedTuple, TypeVar
 from rig.boards import GATES
 from rig.errors import RigError
 from rig.link.transcript import Direction
-from rig.reasons import Reason, rig_error
+from rig.reasons import rig_error
 from rig.records import ClockSample, Drop, HostBreak, Job, Pulse
 from rig.session.drop_check import ByteReplay, check_drop
 from rig.session.faults import translate_errors
 from rig.session.foreign import limit_steps
 from rig.session.rows import RowError, check_rows, drop_of, named_values
-from rig.session.schema import TABLES, Row, RunState, read_identity, read_reasons
+from rig.session.schema import TABLES, Reasons, Row, RunState, read_identity, read_reasons
 
 T = TypeVar("T")
 
@@ -40,7 +40,7 @@ class StateEntry(NamedTuple):
     attempt: int
     state: RunState
     host_ns: int
-    reasons: tuple[Reason, ...]
+    reasons: Reasons
 
 
 class ByteChunk(NamedTuple):

@@ -33,6 +33,9 @@ OLDER = "older"
 _OLD_NOTE = "note: "
 
 
+Reasons: TypeAlias = tuple[Reason, ...]
+
+
 class RunState(StrEnum):
     """State of a planned run; the log of states is append-only."""
 
@@ -124,7 +127,7 @@ def write_reasons(reasons: Iterable[Reason]) -> str:
     return encodable(json.dumps([reason.record() for reason in reasons], ensure_ascii=False))
 
 
-def read_reasons(text: str) -> tuple[Reason, ...]:
+def read_reasons(text: str) -> Reasons:
     """Return the reasons of a text by `write_reasons`, or of a list of sentences of an old file.
 
     Raises

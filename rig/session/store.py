@@ -55,13 +55,7 @@ class Session(Reader, AbstractContextManager["Session"]):
 
     @classmethod
     def create(
-        cls,
-        path: str | os.PathLike[str],
-        protocol_text: str,
-        protocol_source: str,
-        *,
-        simulated: bool,
-        origin: str,
+        cls, path: str | os.PathLike[str], text: str, source: str, *, simulated: bool, origin: str
     ) -> Self:
         """Create a new session file and open it for writing.
 
@@ -69,7 +63,7 @@ class Session(Reader, AbstractContextManager["Session"]):
         ----------
         path
             Path of the file, which must not exist.
-        protocol_text, protocol_source
+        text, source
             The protocol file word for word, and its name.
         simulated
             Whether the data come from a simulation; permanent, and marked on every result.
@@ -85,13 +79,13 @@ class Session(Reader, AbstractContextManager["Session"]):
             "created": _now(),
             "rig_version": __version__,
             "python_version": platform.python_version(),
-            "protocol_sha256": hashlib.sha256(protocol_text.encode()).hexdigest(),
+            "protocol_sha256": hashlib.sha256(text.encode()).hexdigest(),
             "simulated": "true" if simulated else "false",
             "origin": encodable(origin),
         }
         place = Path(os.path.realpath(path))
-        protocol = encodable(protocol_source), protocol_text
-        rows: Record = {"meta": [*meta.items()], "protocol": [(1, *protocol)]}
+        protocol = 1, encodable(source), text
+        rows: Record = {"meta": [*meta.items()], "protocol": [protocol]}
         return cls._connect(place, WriterLock(place), rows)
 
     @classmethod
