@@ -61,7 +61,7 @@ def test_a_refusal_has_its_code_and_values_as_results_have_them():
     (reason,) = data["reason_codes"]
     assert (reason["code"], reason["values"]) == ("refused_gate_blocked", {"channels": [1, 3]})
     assert data["message"] == "gates 1, 3 are blocked"
-    assert rpc.error_to_data(errors.InputError("no"))["reason_codes"] == []
+    assert not rpc.error_to_data(errors.InputError("no"))["reason_codes"]
 
 
 def test_an_error_of_a_kind_nobody_listed_becomes_the_one_above_it():
@@ -281,7 +281,7 @@ def test_a_session_is_shown_until_it_is_closed_and_blind_until_it_is_not(tmp_pat
     protocol = tmp_path / "fence.yaml"
     protocol.write_text(FENCE.replace("RUNS", "1") + "blind: true\n", "utf-8")
     rig = Controller("sim://", PublishedState())
-    rig.open_session(str(protocol), str(tmp_path / "session"))
+    rig.open_session(protocol, tmp_path / "session")
     about = rig.published.get("session")
     assert (about["path"], about["blind"]) == (str(tmp_path / "session"), True)
     rig.unblind()
