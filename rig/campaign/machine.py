@@ -321,8 +321,7 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
             return replace(flow.to(Stage.FIRING), left_s=0.0), (FireRelease(flow.token),)
         case DropVerdict(flow.ticket, verdict, reasons, row) if flow.stage is Stage.JUDGING:
             row = flow.row if row is None else row
-            judged = verdict, reasons
-            return _log(replace(flow, row=row, judged=judged, rejection=(), note=()))
+            return _log(replace(flow, row=row, judged=(verdict, reasons), rejection=(), note=()))
         case GoOn(job, settle_s):
             return _go_on(flow, job, settle_s)
         case Try() if flow.stage in _IDLE:

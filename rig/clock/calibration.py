@@ -84,16 +84,20 @@ class Source(NamedTuple):
         """Time scale over all its samples."""
         return TimeScale(self.rate.hz, hypot(self.rate.u_hz / self.rate.hz, self.u))
 
-    def sometime(self) -> TimeScale:
-        """Time scale at a moment nobody knows: the mean, and how far the rate may be from it."""
-        hz, u = self.mean()
-        track = self.rate.track
-        return TimeScale(hz, hypot(u, track.wander * sqrt(track.span)) if track else u)
+    def at(self, seconds: float | None) -> TimeScale:
+        """Time scale at a moment of the host's time.
 
-    def at(self, seconds: float) -> TimeScale:
-        """Time scale at a moment of the host's time."""
-        hz, u_hz = self.rate.at(seconds)
-        return TimeScale(hz, hypot(u_hz / hz, self.u))
+        Parameters
+        ----------
+        seconds
+            s; for `None`, a moment nobody knows, it is the mean, and how far the rate may be from
+            it.
+        """
+        if seconds is not None:
+            hz, u_hz = self.rate.at(seconds)
+            return TimeScale(hz, hypot(u_hz / hz, self.u))
+        (hz, u), track = self.mean(), self.rate.track
+        return TimeScale(hz, hypot(u, track.wander * sqrt(track.span)) if track else u)
 
 
 class FireTimes(NamedTuple):
@@ -171,11 +175,8 @@ class Calibration(NamedTuple):
         if drop.certificate is None or self.device is None:
             return "stated", TimeScale(drop.tick_hz, self.timer_u)
         when = self.fired.when(drop, self.device.hz) if self.fired else None
-        choice = [
-            (source.name, source.sometime() if when is None else source.at(when))
-            for source in self.sources
-        ]
-        return min(choice, key=lambda named: named[1].u)
+        scales = [(source.name, source.at(when)) for source in self.sources]
+        return min(scales, key=lambda named: named[1].u)
 
 
 class Calibrator:
@@ -234,15 +235,9 @@ def _calibration(session: ClockLog, pings: Samples, reference_u: float) -> Calib
         said["pulses"] = reference.rate.n
     said |= {"epochs": len(split.pings), "host_breaks": len(breaks)}
     said["notes"] = _notes(sources, len(breaks))
-    details = {
-        "source": _WORDS[best.name].format(best.rate.n),
-        "tick_hz": scale.hz,
-        "nominal_tick_hz": nominal,
-        "error_ppm": said["rate_ppm"],
-        "u_ppm": said["u_ppm"],
-        "samples": best.rate.n,
-        "span_s": best.rate.span_s,
-    }
+    details = {"source": _WORDS[best.name].format(best.rate.n), "tick_hz": scale.hz}
+    details |= {"nominal_tick_hz": nominal, "error_ppm": said["rate_ppm"], "u_ppm": said["u_ppm"]}
+    details |= {"samples": best.rate.n, "span_s": best.rate.span_s}
     fired = FireTimes(split, axis, session.fired_ns())
     return Calibration(scale, details, said, u, tuple(sources), fired)
 

@@ -87,10 +87,9 @@ class Server:
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, self.end)
         door = Door(self.path)
-        self.published.set(
-            daemon={"version": __version__, "pid": os.getpid(), "api": rpc.API},
-            port={"url": self.url, "simulated": is_simulated(self.url), "path": self.url},
-        )
+        about = {"version": __version__, "pid": os.getpid(), "api": rpc.API}
+        port = {"url": self.url, "simulated": is_simulated(self.url), "path": self.url}
+        self.published.set(daemon=about, port=port)
         ready()  # said before whatever the worker has to say
         self._worker.start()
         parts: list[Awaitable[Any]] = [
@@ -198,12 +197,8 @@ class Server:
         """End when no client was there for so long and nothing is armed, falling or unsaved."""
         now, state = asyncio.get_running_loop().time(), self.published.get
         drop, error = state("drop") or {}, state("error") or {}
-        if (
-            state("clients")
-            or state("phase") not in {"idle", "trouble"}
-            or drop.get("state") in {"armed", "fired"}
-            or error.get("kind") == "SessionError"
-        ):
+        is_held = drop.get("state") in {"armed", "fired"} or error.get("kind") == "SessionError"
+        if is_held or state("clients") or state("phase") not in {"idle", "trouble"}:
             self._left_at = now
         elif self.idle_s is not None and now - self._left_at >= self.idle_s:
             log.info("no client for %g s; nothing armed, falling or unsaved", self.idle_s)

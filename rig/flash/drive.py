@@ -126,8 +126,7 @@ def _choose_drive(folder: str | None) -> Path:
     if not drives:
         raise rig_error("pico_unmounted" if sees_boot_pico() else "no_pico")
     if len(drives) > 1:
-        names = ", ".join(map(str, drives))
-        raise rig_error("many_picos", count=len(drives), names=names)
+        raise rig_error("many_picos", count=len(drives), names=", ".join(map(str, drives)))
     return drives[0]
 
 

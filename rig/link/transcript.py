@@ -263,7 +263,5 @@ class Transcript:
         if opened_ns is not None:
             self._start_up_s = (host_ns - opened_ns) * 1e-9
             return []
-        if fired is None:
-            return [Restart(host_ns, cause)]
-        label, fired_ns = fired
+        label, fired_ns = fired or (None, host_ns)
         return [Restart(host_ns, cause, label, (host_ns - fired_ns) * 1e-9, self._start_up_s)]

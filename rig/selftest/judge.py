@@ -138,8 +138,7 @@ class JudgeBoard(BoardUnderTest):
         # The judge goes on until the board has ended, which its sync output shows.
         order |= {"gates": gates, "record_ms": record_ms + 50}
         self.prepare(**order)
-        token = board.prepare(**own, record_ms=record_ms)
-        return token, self.prepare(**order)
+        return board.prepare(**own, record_ms=record_ms), self.prepare(**order)
 
 
 def _changes(recorded: RecordedDrop, gate: int) -> tuple[int, int]:

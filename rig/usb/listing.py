@@ -133,8 +133,7 @@ def path_of(serial_number: str, ports: Iterable[SerialPort]) -> str | None:
     """
     paths = [port.path for port in ports if port.serial_number == serial_number]
     if len(paths) > 1:
-        places = " and ".join(paths)
-        raise rig_error("many_serial_numbers", ports=places, number=serial_number)
+        raise rig_error("many_serial_numbers", ports=" and ".join(paths), number=serial_number)
     return paths[0] if paths else None
 
 
