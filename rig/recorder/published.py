@@ -103,17 +103,15 @@ class PublishedState:
             if self._clean:
                 return None
             self._n += 1
-            change: dict[str, Any] = {"n": self._n}
             state, dirty = self._state(), self._dirty
-            if replaced := {name: state[name] for name in state if name in dirty}:
-                change["set"] = replaced
-            if runs := [self._runs[number] for number in self._runs if number in dirty]:
-                change["runs"] = runs
-            if "edges" not in dirty and self._sent < len(self._edges):
-                change["edges"] = self._edges[self._sent :]
+            parts = {
+                "set": {name: state[name] for name in state if name in dirty},
+                "runs": [run for number, run in self._runs.items() if number in dirty],
+                "edges": [] if "edges" in dirty else self._edges[self._sent :],
+            }
             self._sent = len(self._edges)
             dirty.clear()
-            return change
+            return {"n": self._n} | {name: part for name, part in parts.items() if part}
 
     @contextmanager
     def _changing(self) -> Iterator[None]:

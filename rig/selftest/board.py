@@ -121,8 +121,7 @@ class BoardUnderTest(Device):
         NotPossibleError
             The emergency stop forbids it.
         """
-        self._seq = self._seq if again else self._seq % 254 + 1
-        seq = self._seq
+        seq = self._seq = self._seq if again else self._seq % 254 + 1
         code, payload = request if isinstance(request, tuple) else wire.pack(request)
         for _ in range(_TRIES):
             self.write(encode(Frame(code, seq, 0, payload)))

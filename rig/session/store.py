@@ -145,10 +145,8 @@ class Session(Reader, AbstractContextManager["Session"]):
         """
         try:
             self._writable().commit()
-        except SessionError:
+        finally:
             self.require_presence()
-            raise
-        self.require_presence()
 
     def require_presence(self) -> None:
         """Check that the file is still at its path; otherwise save all records elsewhere.

@@ -94,13 +94,12 @@ def _describe(info: "ListPortInfo") -> SerialPort:
     numbers = f"{info.vid or 0:04x}:{info.pid or 0:04x}"
     kinds = [kind for kind in KNOWN if numbers in kind.numbers]
     boards = tuple(kind.product for kind in kinds if kind.product is not None)
+    is_foreign = not (info.product or "").startswith(boards)
     reasons = {
         "no USB device": None in {info.vid, info.pid},
         "no board's USB numbers: name it with --port if it is one": not kinds,
         "a chip that boards and other instruments have: name it with --port": not boards,
-        "a board with another program: name it with --port if it is one of this rig": (
-            not (info.product or "").startswith(boards)
-        ),
+        "a board with another program: name it with --port if it is one of this rig": is_foreign,
     }
     skipped = next((reason for reason, applies in reasons.items() if applies), "")
     texts = info.serial_number, info.manufacturer, info.product
