@@ -2,7 +2,6 @@
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -36,8 +35,7 @@ class Moment(NamedTuple):
     at_ns: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Epochs:
+class Epochs(NamedTuple):
     """Clock samples in the stretches over which the board's counter went on.
 
     Attributes

@@ -6,8 +6,8 @@ Soc. B 40, 364) and its variance exact. The size itself is the most likely one (
 small as a steady clock's unless the readings speak clearly against that.
 """
 
-from dataclasses import dataclass
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +24,7 @@ _POINTS = 300
 _LEAST = 4  # points an epoch keeps at least: fewer would lose its slope
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Readings:
+class Readings(NamedTuple):
     """Phases of a clock.
 
     Attributes
