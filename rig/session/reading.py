@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, TypeVar
 from rig.boards import GATES
 from rig.errors import RigError
 from rig.link.transcript import Direction
-from rig.reasons import rig_error
+from rig.reasons import errors_become, rig_error
 from rig.records import ClockSample, Drop, HostBreak, Job, Pulse
 from rig.session.drop_check import ByteReplay, check_drop
 from rig.session.faults import translate_errors
@@ -259,10 +259,8 @@ class Reader:
         return (kind(*row[1:]) for row in rows)
 
     def _check(self, table: str, rows: Sequence[Row]) -> None:
-        try:
+        with errors_become("session_wrong", RowError, path=self.path):
             check_rows(table, rows)
-        except RowError as error:
-            raise self._damage(str(error)) from error
 
     def _protocol(self) -> Row:
         row = next(self._rows("protocol"), None)

@@ -201,6 +201,8 @@ class SessionTable:
 
     Attributes
     ----------
+    name
+        Its name.
     columns
         Columns in order; those of later formats come last.
     since
@@ -219,17 +221,19 @@ class SessionTable:
         Statement that adds a row of all columns; an empty id is numbered.
     """
 
-    def __init__(self, name: str, since: int, meaning: str, rows: list[str]) -> None:
-        self._name, self.since, self.meaning = name, since, meaning
+    def __init__(self, head: str, rows: list[str]) -> None:
+        words, _, self.meaning = head.partition(": ")
+        self.name, *since = words.split()
+        self.since = int(*since or "1")
         unique = rows.pop(0).removeprefix("  = ") if rows[0].startswith("  = ") else "id"
         self._key, *self._also = unique.split(" | ")
         self.key = len(self._key.split(", "))
         self.order = self._key if self.key > 1 else "rowid"
-        self.columns = [TableColumn(row, since) for row in rows]
+        self.columns = [TableColumn(row, self.since) for row in rows]
         self.numbered = rows[0].split()[2] == "row"
-        self.lengths = {len(self.names(n)) for n in range(since, SCHEMA_VERSION + 1)}
+        self.lengths = {len(self.names(n)) for n in range(self.since, SCHEMA_VERSION + 1)}
         values = ", ".join("?" * len(rows))
-        self.insert = f'INSERT INTO "{name}" VALUES ({values})'  # noqa: S608 - of tables.txt
+        self.insert = f'INSERT INTO "{self.name}" VALUES ({values})'  # noqa: S608 - of tables.txt
 
     def names(self, version: int = SCHEMA_VERSION) -> list[str]:
         """Return the names of a format's columns."""
@@ -237,7 +241,7 @@ class SessionTable:
 
     def script(self, version: int) -> str:
         """Return the script that creates the table in a format."""
-        name, parts = self._name, [c.sql for c in self.columns if c.since <= version]
+        name, parts = self.name, [c.sql for c in self.columns if c.since <= version]
         parts += [f"UNIQUE ({columns})" for columns in self._also]
         parts += [f"PRIMARY KEY ({self._key})"] if self.key > 1 else []
         taken = " OR ".join([_same(self._key), *(f"({_same(columns)})" for columns in self._also)])
@@ -256,16 +260,8 @@ def _same(columns: str) -> str:
     return " AND ".join(f"{name} = NEW.{name}" for name in columns.split(", "))
 
 
-def _read_tables() -> dict[str, SessionTable]:
-    tables = {}
-    for head, *rows in read_paragraphs(__file__, "tables.txt"):
-        words, _, meaning = head.partition(": ")
-        name, *since = words.split()
-        tables[name] = SessionTable(name, int(*since or "1"), meaning, rows)
-    return tables
-
-
-TABLES = _read_tables()
+_TABLES = [SessionTable(head, rows) for head, *rows in read_paragraphs(__file__, "tables.txt")]
+TABLES = {table.name: table for table in _TABLES}
 """Tables by name, in the order in which a commit's rows are hashed."""
 
 _BESIDES = """
