@@ -4,7 +4,7 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import serial
 
@@ -17,6 +17,8 @@ from rig.link.transcript import Direction, Incoming, Record, Restart, Transcript
 from rig.reasons import rig_error
 
 Answer = TypeVar("Answer", bound=wire.DeviceMessage)
+Halted: TypeAlias = Callable[[], bool]
+"""Asked all the time whether what is under way shall end."""
 
 _WAIT_S = 0.1  # for the first answer
 _LONGEST_WAIT_S = 0.5

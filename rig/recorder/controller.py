@@ -1,11 +1,11 @@
 """What clients can ask for, carried out on one port and one session file by one thread."""
 
 import logging
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from rig.errors import InputError, RigError, StoppedError
+from rig.link.exchange import Halted
 from rig.link.messages import TEST_RUN, Identity, RefusalReason
 from rig.link.port import Port
 from rig.link.refusals import DeviceRefusedError
@@ -48,9 +48,7 @@ class Controller:
         Run and attempt of a drop that fell and was not collected yet.
     """
 
-    def __init__(
-        self, url: str, published: PublishedState, halted: Callable[[], bool] = lambda: False
-    ) -> None:
+    def __init__(self, url: str, published: PublishedState, halted: Halted = lambda: False) -> None:
         self.url = url
         self.published = published
         self.recorder: Recorder | None = None

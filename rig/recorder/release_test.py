@@ -1,10 +1,10 @@
 """The release driven once with nothing hung from it: a drop of no run, of which only bytes stay."""
 
-from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
 from rig.errors import DeviceError
+from rig.link.exchange import Halted
 from rig.link.messages import TEST_RUN, Phase, pack_label
 from rig.protocol.protocol import Protocol
 from rig.recorder.recorder import Recorder, arm_order
@@ -14,7 +14,7 @@ _TIMEOUT_MS = 1000  # it is fired at once, or never
 _AFTER_MS = 500  # what falls or trembles because of the pulse has been seen by then
 
 
-def drive(recorder: Recorder, protocol: Protocol, halted: Callable[[], bool]) -> dict[str, Any]:
+def drive(recorder: Recorder, protocol: Protocol, halted: Halted) -> dict[str, Any]:
     """Arm and fire with the protocol's pulse, and look what the gates see of it.
 
     Parameters
