@@ -132,13 +132,10 @@ def read_reasons(text: str) -> Reasons:
 
     Raises
     ------
-    TypeError, ValueError
+    TypeError, ValueError, msgspec.ValidationError
         The text is neither.
     """
-    rows = json.loads(text)
-    if not isinstance(rows, list):
-        raise TypeError(f"{text:.40} is no list of reasons")
-    return tuple(map(_read_reason, rows))
+    return tuple(map(_read_reason, msgspec.convert(json.loads(text), list)))
 
 
 def _read_reason(row: object) -> Reason:
