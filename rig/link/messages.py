@@ -23,10 +23,11 @@ import typing
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields
 from enum import IntEnum
+from functools import cache
 from itertools import starmap
 from typing import Annotated, Any, NamedTuple, TypeAlias, dataclass_transform
 
-from rig.boards import Capabilities
+from rig.boards import GATES, Capabilities
 from rig.errors import DeviceError
 from rig.link.frames import PAYLOAD_LIMIT
 from rig.records import Job
@@ -58,6 +59,12 @@ EVENTS_PER_FRAME = PAYLOAD_LIMIT // EVENT.size - 1
 def pack_events(events: Iterable[tuple[int, int]]) -> bytes:
     """Write ticks and states as they stand in a frame; one that does not fit is a struct.error."""
     return b"".join(starmap(EVENT.pack, events))
+
+
+@cache
+def channels_of(mask: int) -> list[int]:
+    """List the channels of a mask of gates."""
+    return [n for n in range(GATES) if mask >> n & 1]
 
 
 class UnsignedInt(NamedTuple):

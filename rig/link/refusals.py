@@ -1,8 +1,7 @@
 """What a refusal means, and what the user can do about it."""
 
-from rig.boards import GATES
 from rig.errors import DeviceError
-from rig.link.messages import PROTOCOL_VERSION, DisarmReason, RefusalReason
+from rig.link.messages import PROTOCOL_VERSION, DisarmReason, RefusalReason, channels_of
 from rig.reasons import make_reason, remedies
 
 
@@ -23,10 +22,9 @@ class DeviceRefusedError(DeviceError):
         if reason is not RefusalReason.NOT_ARMED:
             disarmed = None
         code = f"disarmed_{disarmed.name}" if disarmed else f"refused_{reason.name}"
-        channels = [n for n in range(GATES) if detail >> n & 1]
         values: dict[RefusalReason, dict[str, object]] = {
-            RefusalReason.GATE_BLOCKED: {"channels": channels},
-            RefusalReason.GATE_UNSTEADY: {"channels": channels},
+            RefusalReason.GATE_BLOCKED: {"channels": channels_of(detail)},
+            RefusalReason.GATE_UNSTEADY: {"channels": channels_of(detail)},
             RefusalReason.HOLDING_A_DROP: {"run": detail},
             RefusalReason.VERSION: {"firmware": detail, "program": PROTOCOL_VERSION},
             RefusalReason.COOLING: {"rest_s": detail / 1000},

@@ -5,7 +5,6 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
-from rig.boards import GATES
 from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.exchange import Answer
@@ -67,7 +66,7 @@ class GateStates(NamedTuple):
 
 def name_gates(mask: int) -> str:
     """Name the gates of a mask, as in ``gates 1, 8``."""
-    numbers = [str(n) for n in range(GATES) if mask >> n & 1]
+    numbers = [str(n) for n in wire.channels_of(mask)]
     return f"gate{'s' * (len(numbers) > 1)} {', '.join(numbers)}"
 
 
