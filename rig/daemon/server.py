@@ -17,7 +17,6 @@ from rig.daemon import rpc
 from rig.daemon.connection import HELLO_S, Connection
 from rig.daemon.lease import LEASE_S
 from rig.daemon.listener import Door
-from rig.daemon.rpc import error_to_data
 from rig.daemon.service import Service
 from rig.daemon.socket_path import peer_uid
 from rig.errors import InputError
@@ -185,7 +184,7 @@ class Server:
     def _see_worker(self) -> None:
         """Tell every client when nothing is known any more, and when it is again."""
         stall, before = self._worker.stall(), self._stall
-        self._stall = None if stall is None else error_to_data(stall)
+        self._stall = None if stall is None else rpc.error_to_data(stall)
         if stall is not None:
             if before is None:
                 log.warning("%s (%s)", stall.message, stall.hint)

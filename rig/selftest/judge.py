@@ -8,7 +8,6 @@ from statistics import stdev
 
 from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.link import messages as wire
-from rig.link.messages import DisarmReason, RefusalReason
 from rig.selftest.board import BoardUnderTest, Check, RecordedDrop, name_gates
 from rig.selftest.checks import identify
 from rig.selftest.findings import fail_if, insist
@@ -107,9 +106,9 @@ class JudgeBoard(BoardUnderTest):
         own = {"gates": AT_BEAMS}
         _, judge_token = self._arm_both(board, own, release=STOP, pulse_us=_LONG_US)
         self.fire(judge_token)
-        board.wait_disarmed("an open stop", DisarmReason.STOPPED, 0.1)
+        board.wait_disarmed("an open stop", wire.DisarmReason.STOPPED, 0.1)
         answer = board.request(board.order(**own), wire.DeviceMessage)
-        insist("Arm", answer, wire.Refused(RefusalReason.STOPPED, 0))
+        insist("Arm", answer, wire.Refused(wire.RefusalReason.STOPPED, 0))
         self.collect_drop()
 
     def disturb_beam(self, board: BoardUnderTest) -> None:
@@ -118,7 +117,7 @@ class JudgeBoard(BoardUnderTest):
         token, judge_token = self._arm_both(board, own, release=BEAMS, pulse_us=1000)
         self.fire(judge_token)
         self.collect_drop()
-        board.refuse(wire.Fire(token), RefusalReason.GATE_UNSTEADY, AT_BEAMS)
+        board.refuse(wire.Fire(token), wire.RefusalReason.GATE_UNSTEADY, AT_BEAMS)
 
     def _pulse(
         self, board: BoardUnderTest, output: int, length_us: int, gates: int, **own: int
