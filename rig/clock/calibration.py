@@ -125,14 +125,12 @@ class FireTimes(NamedTuple):
         hz
             The board's mean rate.
         """
-        fired_ns = self.fired_ns.get(drop.job)
-        if fired_ns is None or drop.fire_tick is None:
+        fired_ns, tick = self.fired_ns.get(drop.job), drop.fire_tick
+        if fired_ns is None or tick is None:
             return None
         # Restarts of the host leave open which of its times a log entry means; the tick decides.
-        moments = (
-            self.samples.place(drop.fire_tick, fired_ns + shift, hz, 0.0, _FIRED_S)
-            for shift in self.time.shifts(fired_ns)
-        )
+        times_ns = [fired_ns + shift for shift in self.time.shifts(fired_ns)]
+        moments = (self.samples.place(tick, time_ns, hz, 0.0, _FIRED_S) for time_ns in times_ns)
         return next((moment.at_ns * 1e-9 for moment in moments if moment is not None), None)
 
 

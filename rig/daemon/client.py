@@ -15,7 +15,7 @@ from concurrent.futures import Future, wait
 from contextlib import ExitStack, nullcontext, suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeAlias
 
 import msgspec
 
@@ -30,6 +30,8 @@ from rig.records import Drop, Job
 from rig.session.reading import Reader
 from rig.session.schema import Reasons, RunState
 from rig.session.store import Session
+
+Hook: TypeAlias = Callable[..., object]
 
 HELLO_S = 10.0
 """How long a client waits for the answer to `hello`."""
@@ -69,11 +71,7 @@ class Line:
     """
 
     def __init__(
-        self,
-        path: Path,
-        name: str,
-        notify: Callable[[str, dict[str, Any]], None] = lambda _method, _params: None,
-        end: Callable[[], None] = lambda: None,
+        self, path: Path, name: str, notify: Hook = lambda *_: None, end: Hook = lambda *_: None
     ) -> None:
         self._notify, self._end = notify, end
         self._guard = threading.Lock()  # one line after the other, and none after the end
