@@ -27,10 +27,9 @@ class Fate(StrEnum):
     RESTORED = "put together again from its bytes"
     PARTIAL = "not whole: neither the record nor the bytes have all of it"
 
-    @property
-    def whole(self) -> bool:
-        """Whether the stored record counts as the recorded one."""
-        return self in {Fate.CONFIRMED, Fate.IMPORTED, Fate.UNCONFIRMED}
+
+WHOLE = {Fate.CONFIRMED, Fate.IMPORTED, Fate.UNCONFIRMED}
+"""Fates for which the stored record counts as the recorded one."""
 
 
 class ByteReplay:

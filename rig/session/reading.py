@@ -16,7 +16,7 @@ from rig.errors import RigError
 from rig.link.transcript import Direction
 from rig.reasons import errors_become, rig_error
 from rig.records import ClockSample, Drop, HostBreak, Job, Pulse
-from rig.session.drop_check import ByteReplay, check_drop
+from rig.session.drop_check import WHOLE, ByteReplay, check_drop
 from rig.session.faults import translate_errors
 from rig.session.foreign import limit_steps
 from rig.session.rows import RowError, check_rows, drop_of, named_values
@@ -273,7 +273,7 @@ class Reader:
         try:
             check_rows("drop", [row])
             stored = drop_of(row, self._edges(row))
-            if check_drop(stored, replayed).whole:
+            if check_drop(stored, replayed) in WHOLE:
                 return stored
             why = stored.damage or "its edges do not agree with its bytes or its certificate"
         except RowError as error:
