@@ -9,6 +9,7 @@ from rig.daemon.server import Server
 from rig.link.messages import Fired
 from rig.link.transcript import Incoming
 from rig.recorder.feed import StateFeed
+from rig.records import Job
 from rig.session.schema import RunState
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def serve(folder: Path, work: Callable[[Server], T]) -> T:
 def fire(server: Server) -> StateFeed:
     """Return the feed of a drop that has just been fired."""
     view = StateFeed(server.published)
-    view.state(1, 1, RunState.ARMED, ())
+    view.state(Job(1, 1), RunState.ARMED, ())
     view.know(Incoming(0, 1, Fired(0)))
     return view
 

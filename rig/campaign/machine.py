@@ -5,9 +5,6 @@ returns what came of them, with the ticket of the effect: an answer to what was 
 has an old ticket and changes nothing. Stages, events and effects come first, then the steps.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import NamedTuple, TypeAlias
 
@@ -242,8 +239,7 @@ _DISTURBED = (
 Outcome: TypeAlias = "tuple[Flow, tuple[Effect, ...]]"
 
 
-@dataclass(frozen=True, slots=True)
-class Flow:
+class Flow(NamedTuple):
     """Where the campaign is.
 
     Attributes
@@ -295,11 +291,10 @@ class Flow:
     attended: bool = True
     row: VoidRow = ()
 
-    def to(self, stage: Stage, trouble: str = "") -> Flow:
+    def to(self, stage: Stage, trouble: str = "") -> "Flow":
         """Go to another stage; answers to earlier effects count no more."""
-        return replace(
-            self, stage=stage, ticket=self.ticket + 1, trouble=trouble, home=Stage.PREPARE
-        )
+        ticket = self.ticket + 1
+        return self._replace(stage=stage, ticket=ticket, trouble=trouble, home=Stage.PREPARE)
 
 
 def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an event
@@ -310,7 +305,7 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
         case Lost(trouble):
             return _lost(flow, trouble)
         case Notice(trouble):
-            return replace(flow, trouble=flow.trouble or trouble), ()
+            return flow._replace(trouble=flow.trouble or trouble), ()
         case EffectDone(flow.ticket, token):
             return _take_answer(flow, token)
         case EffectDone(token=int()):
@@ -320,32 +315,31 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
             return _effect_failed(flow, event)
         case Tick(seconds) if flow.stage is Stage.COUNTDOWN:
             if seconds < flow.left_s:
-                return replace(flow, left_s=flow.left_s - seconds), ()
-            return replace(flow.to(Stage.FIRING), left_s=0.0), (FireRelease(flow.token),)
+                return flow._replace(left_s=flow.left_s - seconds), ()
+            return flow.to(Stage.FIRING)._replace(left_s=0.0), (FireRelease(flow.token),)
         case DropVerdict(flow.ticket, verdict, reasons, row) if flow.stage is Stage.JUDGING:
             row = flow.row if row is None else row
-            judged = verdict, reasons
-            return _log(replace(flow, row=row, judged=judged, rejection=(), note=()))
+            return _log(flow._replace(row=row, judged=(verdict, reasons), rejection=(), note=()))
         case GoOn(job, settle_s):
             return _go_on(flow, job, settle_s)
         case Try() if flow.stage in _IDLE:
-            return replace(flow.to(Stage.TESTING), home=flow.stage), (Drive(),)
+            return flow.to(Stage.TESTING)._replace(home=flow.stage), (Drive(),)
         case SessionOpen() if flow.stage is Stage.PROTOCOL:
             return flow.to(Stage.DEVICE), ()
         case SessionClose() if flow.stage in {*_IDLE, *_VERDICT}:
-            return replace(flow.to(Stage.PROTOCOL), job=None, row=()), ()
+            return flow.to(Stage.PROTOCOL)._replace(job=None, row=()), ()
         case Found(job) if flow.stage in {*_IDLE, Stage.HALTED}:
-            return replace(flow, job=job).to(Stage.JUDGING), (Judge(job),)
+            return flow._replace(job=job).to(Stage.JUDGING), (Judge(job),)
         case Again(job) if flow.stage in {*_IDLE, *_VERDICT}:
             return _onward(flow, job)
         case Reject(cause) if flow.stage is Stage.RESULT and cause.strip():
-            return _log(replace(flow, rejection=(plain_reason(cause.strip(), OPERATOR),)))
+            return _log(flow._replace(rejection=(plain_reason(cause.strip(), OPERATOR),)))
         case Restore() if flow.stage is Stage.RESULT and flow.rejection:
-            return _log(replace(flow, rejection=()))
+            return _log(flow._replace(rejection=()))
         case Note(text) if flow.stage is Stage.RESULT:
             note = (plain_reason(text.strip(), NOTE),) if text.strip() else ()
             if note != flow.note:  # what was noted before stays in the log
-                return _log(replace(flow, note=note))
+                return _log(flow._replace(note=note))
     return flow, ()
 
 
@@ -374,12 +368,12 @@ def _take_answer(flow: Flow, token: int | None) -> Outcome:
     if flow.stage is Stage.SETTLING:
         return flow.to(Stage.ARMING), (ArmRelease(job),)
     if flow.stage is Stage.ARMING:
-        return replace(flow.to(Stage.COUNTDOWN), token=token or 0, left_s=flow.countdown_s), ()
+        return flow.to(Stage.COUNTDOWN)._replace(token=token or 0, left_s=flow.countdown_s), ()
     if flow.stage is Stage.FIRING:
-        return replace(flow.to(Stage.LIVE), refusals=0), (Collect(job),)
+        return flow.to(Stage.LIVE)._replace(refusals=0), (Collect(job),)
     if flow.stage is Stage.LIVE:
         return flow.to(Stage.JUDGING), (Judge(job),)
-    return replace(flow, logged=True), ()
+    return flow._replace(logged=True), ()
 
 
 def _effect_failed(flow: Flow, event: EffectFailure) -> Outcome:
@@ -388,7 +382,7 @@ def _effect_failed(flow: Flow, event: EffectFailure) -> Outcome:
     if flow.stage in {*BEFORE_RELEASE, Stage.LIVE, Stage.JUDGING}:
         return flow.to(flow.home, event.trouble), (GiveUp(),)
     unlogged = () if flow.logged else (GiveUp(),)
-    return replace(flow, trouble=event.trouble, logged=True), unlogged
+    return flow._replace(trouble=event.trouble, logged=True), unlogged
 
 
 def _take_refusal(flow: Flow, event: EffectFailure) -> Outcome:
@@ -399,17 +393,17 @@ def _take_refusal(flow: Flow, event: EffectFailure) -> Outcome:
     if is_firing:
         # Whether it was let go is not known for sure when the answer is an error.
         stop = Stop(event.trouble.partition("\n")[0])
-        flow = replace(flow.to(Stage.PREPARE, event.trouble), refusals=refusals)
+        flow = flow.to(Stage.PREPARE, event.trouble)._replace(refusals=refusals)
         return flow, (stop, *give_up)
     if flow.attended or give_up:
         return flow.to(flow.home, event.trouble), give_up
     pause = event.detail / 1000 if event.reason is RefusalReason.COOLING else LOOK_S
-    return replace(flow.to(Stage.SETTLING), refusals=refusals), (Wait(pause),)
+    return flow.to(Stage.SETTLING)._replace(refusals=refusals), (Wait(pause),)
 
 
 def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Outcome:
     if flow.stage is Stage.PREPARE and job is not None:
-        return replace(flow, job=job).to(Stage.SETTLING), (Wait(settle_s),)
+        return flow._replace(job=job).to(Stage.SETTLING), (Wait(settle_s),)
     if flow.stage is Stage.HALTED and flow.job is not None:
         return _onward(flow, Job(flow.job.run, flow.job.attempt + 1))
     # What comes after a result depends on it: it is logged first.
@@ -421,10 +415,10 @@ def _go_on(flow: Flow, job: Job | None, settle_s: float) -> Outcome:
 def _onward(flow: Flow, job: Job | None) -> Outcome:
     """Go to the next attempt, unless the last ones say that it would be void too."""
     if flow.stage is Stage.RESULT and (why := why_halted(flow.row)):
-        return replace(flow.to(Stage.HALTED, why), row=()), ()
+        return flow.to(Stage.HALTED, why)._replace(row=()), ()
     if job is None:
         return flow.to(Stage.DONE), ()
-    return replace(flow, job=job).to(Stage.PREPARE), ()
+    return flow._replace(job=job).to(Stage.PREPARE), ()
 
 
 def _log(flow: Flow) -> Outcome:
@@ -434,5 +428,5 @@ def _log(flow: Flow) -> Outcome:
     state, reasons = ("rejected", flow.rejection) if flow.rejection else flow.judged
     reasons += flow.note
     row = after(flow.row, job, state, reasons)
-    flow = replace(flow.to(Stage.RESULT), verdict=state, reasons=reasons, logged=False, row=row)
+    flow = flow.to(Stage.RESULT)._replace(verdict=state, reasons=reasons, logged=False, row=row)
     return flow, (Log(job, state, reasons),)

@@ -1,7 +1,5 @@
 """Which attempt comes next, and what it takes: the rules of a plan on its way."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 from rig.protocol.protocol import Run

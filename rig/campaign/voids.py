@@ -1,7 +1,5 @@
 """Voids in a row: what they have in common, and which of them are held against their runs."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
@@ -10,10 +8,10 @@ from rig.reasons import Reason, make_reason, remedies, summarize_reasons
 from rig.recorder.run_lines import RunLine
 from rig.records import Job
 from rig.session.reading import StateEntry
+from rig.session.schema import VERDICTS
 
 MANY = 3
 """Voids of a kind in a row after which it is not the drop that is at fault."""
-_VERDICTS = ("accepted", "marginal", "void", "rejected")
 
 
 class Void(NamedTuple):
@@ -86,7 +84,7 @@ def voids_of(entries: Iterable[StateEntry]) -> Voids:
     forgiven: set[Job] = set()
     for entry in entries:
         job = Job(entry.run, entry.attempt)
-        if entry.state in _VERDICTS and job not in forgiven:
+        if entry.state in VERDICTS and job not in forgiven:
             row = after(row, job, entry.state, entry.reasons)
             verdicts[job] = entry.state
         if in_common(row):

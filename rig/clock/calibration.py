@@ -1,7 +1,5 @@
 """The time scale of a session: from its clock samples to seconds, and how far to trust them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from math import floor, hypot, log2, sqrt
 from typing import Any, NamedTuple, Protocol
@@ -36,7 +34,7 @@ class TimeScale(NamedTuple):
     hz: float
     u: float
 
-    def coarse(self) -> TimeScale:
+    def coarse(self) -> "TimeScale":
         """Return a scale near by, good enough to tell rods apart: further samples leave it."""
         step = 2.0 ** floor(log2(_ROUGH * self.hz))
         return TimeScale(step * round(self.hz / step), max(self.u, _ROUGH))
@@ -86,16 +84,20 @@ class Source(NamedTuple):
         """Time scale over all its samples."""
         return TimeScale(self.rate.hz, hypot(self.rate.u_hz / self.rate.hz, self.u))
 
-    def sometime(self) -> TimeScale:
-        """Time scale at a moment nobody knows: the mean, and how far the rate may be from it."""
-        hz, u = self.mean()
-        track = self.rate.track
-        return TimeScale(hz, hypot(u, track.wander * sqrt(track.span)) if track else u)
+    def at(self, seconds: float | None) -> TimeScale:
+        """Time scale at a moment of the host's time.
 
-    def at(self, seconds: float) -> TimeScale:
-        """Time scale at a moment of the host's time."""
-        hz, u_hz = self.rate.at(seconds)
-        return TimeScale(hz, hypot(u_hz / hz, self.u))
+        Parameters
+        ----------
+        seconds
+            s; for `None`, a moment nobody knows, it is the mean, and how far the rate may be from
+            it.
+        """
+        if seconds is not None:
+            hz, u_hz = self.rate.at(seconds)
+            return TimeScale(hz, hypot(u_hz / hz, self.u))
+        (hz, u), track = self.mean(), self.rate.track
+        return TimeScale(hz, hypot(u, track.wander * sqrt(track.span)) if track else u)
 
 
 class FireTimes(NamedTuple):
@@ -123,14 +125,12 @@ class FireTimes(NamedTuple):
         hz
             The board's mean rate.
         """
-        fired_ns = self.fired_ns.get(drop.job)
-        if fired_ns is None or drop.fire_tick is None:
+        fired_ns, tick = self.fired_ns.get(drop.job), drop.fire_tick
+        if fired_ns is None or tick is None:
             return None
         # Restarts of the host leave open which of its times a log entry means; the tick decides.
-        moments = (
-            self.samples.place(drop.fire_tick, fired_ns + shift, hz, 0.0, _FIRED_S)
-            for shift in self.time.shifts(fired_ns)
-        )
+        times_ns = [fired_ns + shift for shift in self.time.shifts(fired_ns)]
+        moments = (self.samples.place(tick, time_ns, hz, 0.0, _FIRED_S) for time_ns in times_ns)
         return next((moment.at_ns * 1e-9 for moment in moments if moment is not None), None)
 
 
@@ -173,11 +173,8 @@ class Calibration(NamedTuple):
         if drop.certificate is None or self.device is None:
             return "stated", TimeScale(drop.tick_hz, self.timer_u)
         when = self.fired.when(drop, self.device.hz) if self.fired else None
-        choice = [
-            (source.name, source.sometime() if when is None else source.at(when))
-            for source in self.sources
-        ]
-        return min(choice, key=lambda named: named[1].u)
+        scales = [(source.name, source.at(when)) for source in self.sources]
+        return min(scales, key=lambda named: named[1].u)
 
 
 class Calibrator:
@@ -236,15 +233,9 @@ def _calibration(session: ClockLog, pings: Samples, reference_u: float) -> Calib
         said["pulses"] = reference.rate.n
     said |= {"epochs": len(split.pings), "host_breaks": len(breaks)}
     said["notes"] = _notes(sources, len(breaks))
-    details = {
-        "source": _WORDS[best.name].format(best.rate.n),
-        "tick_hz": scale.hz,
-        "nominal_tick_hz": nominal,
-        "error_ppm": said["rate_ppm"],
-        "u_ppm": said["u_ppm"],
-        "samples": best.rate.n,
-        "span_s": best.rate.span_s,
-    }
+    details = {"source": _WORDS[best.name].format(best.rate.n), "tick_hz": scale.hz}
+    details |= {"nominal_tick_hz": nominal, "error_ppm": said["rate_ppm"], "u_ppm": said["u_ppm"]}
+    details |= {"samples": best.rate.n, "span_s": best.rate.span_s}
     fired = FireTimes(split, axis, session.fired_ns())
     return Calibration(scale, details, said, u, tuple(sources), fired)
 

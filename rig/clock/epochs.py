@@ -1,10 +1,7 @@
 """Ticks of 32 bits made wide, in epochs between restarts of the board."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -38,8 +35,7 @@ class Moment(NamedTuple):
     at_ns: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Epochs:
+class Epochs(NamedTuple):
     """Clock samples in the stretches over which the board's counter went on.
 
     Attributes
@@ -76,8 +72,7 @@ class Epochs:
             `None` when no epoch's counter can have stood there then: the samples before it are of
             another epoch.
         """
-        starts = [int(pings[0, SEND]) for pings in self.pings]
-        number = bisect_right(starts, host_ns) - 1
+        number = bisect_right([int(pings[0, SEND]) for pings in self.pings], host_ns) - 1
         if number < 0:
             return None
         pings = self.pings[number]
@@ -124,8 +119,7 @@ def epochs(pings: Samples, nominal_hz: int, cuts_ns: Sequence[int] = ()) -> Epoc
 def _steps(columns: Samples, nominal_hz: int) -> NDArray[np.int64]:
     """Count ticks from each sample to the next; `_BROKEN` when they cannot be of one count."""
     trips_ns = columns[:, RECV] - columns[:, SEND]
-    middles_ns = (columns[:, SEND] + columns[:, RECV]) // 2
-    expected = np.diff(middles_ns) * 1e-9 * nominal_hz
+    expected = np.diff((columns[:, SEND] + columns[:, RECV]) // 2) * 1e-9 * nominal_hz
     slack = np.abs(expected) * _SEARCH + (trips_ns[1:] + trips_ns[:-1]) * 1e-9 * nominal_hz / 2 + 2
     rounded = np.rint(expected).astype(np.int64)
     # Nearest to the expectation among the values that agree with the 32 bits seen.

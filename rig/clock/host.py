@@ -1,7 +1,5 @@
 """The host's clock, which can be replaced, and whether the host's clocks go on as one."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
@@ -39,13 +37,13 @@ class HostClocks(NamedTuple):
     monotonic
         The clock of all samples; on Linux it stands still while the host sleeps.
     boottime
-        The same, going on through sleep; `None` where the system has none.
+        The same, going on through sleep; where the system has none, about `monotonic` again.
     wall
         Time of day, which may be set.
     """
 
     monotonic: int
-    boottime: int | None
+    boottime: int
     wall: int
 
 
@@ -54,7 +52,7 @@ def read_clocks() -> HostClocks:
     readings: list[tuple[int, HostClocks]] = []
     for _ in range(_TRIES):
         before = time.monotonic_ns()
-        boottime = None if _BOOTTIME is None else time.clock_gettime_ns(_BOOTTIME)
+        boottime = before if _BOOTTIME is None else time.clock_gettime_ns(_BOOTTIME)
         wall = time.time_ns()
         took = time.monotonic_ns() - before
         readings.append((took, HostClocks(before + took // 2, boottime, wall)))
@@ -82,9 +80,8 @@ class HostWatch:
     def look(self) -> HostBreak | None:
         """Return what happened since the last look, `None` when nothing did."""
         last, clocks = self._last, self._read()
-        awake_ns = passed_ns = clocks.monotonic - last.monotonic
-        if clocks.boottime is not None and last.boottime is not None:
-            passed_ns = clocks.boottime - last.boottime
+        passed_ns = clocks.boottime - last.boottime
+        awake_ns = clocks.monotonic - last.monotonic
         moved = passed_ns - awake_ns, clocks.wall - last.wall - passed_ns
         slept_ns, stepped_ns = (ns if abs(ns) >= TOLERANCE_NS else 0 for ns in moved)
         if not slept_ns and not stepped_ns:

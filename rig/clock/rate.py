@@ -1,7 +1,5 @@
 """The device's tick rate, from pings by the host's clock and from pulses of a 1 Hz reference."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from math import sqrt

@@ -3,10 +3,7 @@
 A night has a hundred thousand of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -32,8 +29,7 @@ class Stretch(NamedTuple):
     shift_ns: int
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class HostTime:
+class HostTime(NamedTuple):
     """Clock samples on one axis of time.
 
     Attributes

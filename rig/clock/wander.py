@@ -6,10 +6,8 @@ Soc. B 40, 364) and its variance exact. The size itself is the most likely one (
 small as a steady clock's unless the readings speak clearly against that.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +24,7 @@ _POINTS = 300
 _LEAST = 4  # points an epoch keeps at least: fewer would lose its slope
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Readings:
+class Readings(NamedTuple):
     """Phases of a clock.
 
     Attributes
@@ -47,7 +44,7 @@ class Readings:
     sigma: Array
     epoch: Index
 
-    def only(self, which: NDArray[np.bool_]) -> Readings:
+    def only(self, which: NDArray[np.bool_]) -> "Readings":
         """Choose some; epochs left with fewer than two say nothing and are left out."""
         counts = np.bincount(self.epoch[which], minlength=int(self.epoch.max(initial=-1)) + 1)
         which = which & (counts[self.epoch] >= 2)
@@ -74,13 +71,12 @@ class Track:
         points = _condense(readings)
         self.begin = float(readings.at[0])
         self.span = float(readings.at[-1]) - self.begin
-        self._x = (points.at - self.begin) / self.span
+        self._x = x = (points.at - self.begin) / self.span
         self._sigma = points.sigma
         n, epochs = points.at.size, int(points.epoch[-1]) + 1
         design = np.zeros((n, epochs + 1))
         design[np.arange(n), points.epoch] = 1.0
-        design[:, -1] = self._x
-        x = self._x
+        design[:, -1] = x
         low, high = np.minimum.outer(x, x), np.maximum.outer(x, x)
         self._kernel = low**2 * (3.0 * high - low) / 6.0  # of ∫ random walk
         # In these coordinates noise and walk are both diagonal, for every size of the walk.
@@ -130,8 +126,8 @@ class Track:
     def residuals(self, readings: Readings) -> Array:
         """Phases less the estimate, over their expected scatter, for the epochs of the track."""
         x = (readings.at - self.begin) / self.span
-        weights = self._g * (self._phase - self._design @ self._beta)
-        walk = self._ratio * self._kernel @ ((self._turn @ weights) / self._sigma)
+        weights = self._turn @ (self._g * self._rest)
+        walk = self._ratio * self._kernel @ (weights / self._sigma)
         course = self._beta[-1] * x + np.interp(x, self._x, walk)
         residuals: Array = (readings.phase - self._beta[readings.epoch] - course) / readings.sigma
         return residuals
@@ -143,7 +139,7 @@ class Track:
         information = self._design.T @ (g[:, None] * self._design)
         self._covariance = np.linalg.inv(information)
         self._beta = self._covariance @ (self._design.T @ (g * self._phase))
-        rest = self._phase - self._design @ self._beta
+        self._rest = rest = self._phase - self._design @ self._beta
         degrees = rest.size - self._beta.size + _PRIOR
         self._scale2 = (float(g @ rest**2) + _PRIOR) / degrees
         _, volume = np.linalg.slogdet(information)
@@ -152,10 +148,9 @@ class Track:
     def _estimate(self, with_phase: Array, variance: float) -> tuple[float, float]:
         """Estimate a functional of the walk, given its covariances, beside the constant."""
         c = self._ratio * (self._turn.T @ (with_phase / self._sigma))
-        rest = self._phase - self._design @ self._beta
         direct = -self._design.T @ (self._g * c)
         direct[-1] += 1.0
-        value = float(self._beta[-1] + c @ (self._g * rest))
+        value = float(self._beta[-1] + c @ (self._g * self._rest))
         unseen = self._ratio * variance - float(c @ (self._g * c))
         u2 = self._scale2 * (max(0.0, unseen) + float(direct @ self._covariance @ direct))
         return value / self.span, sqrt(u2) / self.span
@@ -175,10 +170,8 @@ def _condense(readings: Readings) -> Readings:
     number = np.cumsum(np.diff(readings.epoch * (n + _LEAST) + bins, prepend=-1) != 0) - 1
     weight = readings.sigma**-2.0
     total = np.bincount(number, weight)
-    start = np.flatnonzero(np.diff(number, prepend=-1))
-    return Readings(
-        np.bincount(number, weight * readings.at) / total,
-        np.bincount(number, weight * readings.phase) / total,
-        1.0 / np.sqrt(total),
-        readings.epoch[start],
+    at, phase = (
+        np.bincount(number, weight * values) / total for values in (readings.at, readings.phase)
     )
+    epoch = readings.epoch[np.flatnonzero(np.diff(number, prepend=-1))]
+    return Readings(at, phase, 1.0 / np.sqrt(total), epoch)

@@ -3,8 +3,6 @@
 Scripts and the runner wait; faces, which show what is going on, have a loop of their own.
 """
 
-from __future__ import annotations
-
 import asyncio
 import itertools
 import json
@@ -17,19 +15,23 @@ from concurrent.futures import Future, wait
 from contextlib import ExitStack, nullcontext, suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Self, TypeAlias
+
+import msgspec
 
 from rig.daemon import rpc
 from rig.daemon.lease import LEASE_S
 from rig.daemon.replica import Replica
 from rig.daemon.socket_path import check_folder
 from rig.errors import RigError
-from rig.reasons import Reason, rig_error
+from rig.reasons import errors_become, rig_error
 from rig.recorder.interrupts import Interrupts
-from rig.records import Drop
+from rig.records import Drop, Job
 from rig.session.reading import Reader
-from rig.session.schema import RunState
+from rig.session.schema import Reasons, RunState
 from rig.session.store import Session
+
+Hook: TypeAlias = Callable[..., object]
 
 HELLO_S = 10.0
 """How long a client waits for the answer to `hello`."""
@@ -69,11 +71,7 @@ class Line:
     """
 
     def __init__(
-        self,
-        path: Path,
-        name: str,
-        notify: Callable[[str, dict[str, Any]], None] = lambda _method, _params: None,
-        end: Callable[[], None] = lambda: None,
+        self, path: Path, name: str, notify: Hook = lambda *_: None, end: Hook = lambda *_: None
     ) -> None:
         self._notify, self._end = notify, end
         self._guard = threading.Lock()  # one line after the other, and none after the end
@@ -119,13 +117,13 @@ class Line:
     def _read(self) -> None:
         over = rig_error("daemon_gone", text="it hung up")
         try:
-            with self._socket.makefile("rb") as stream:
+            with errors_become("daemon_gone", OSError), self._socket.makefile("rb") as stream:
                 while (line := stream.readline(rpc.MESSAGE_LIMIT)).endswith(b"\n"):
-                    self._take(_message_of(line))
+                    with errors_become("not_a_daemon", ValueError, msgspec.ValidationError):
+                        message = msgspec.convert(json.loads(line), dict[str, Any])
+                    self._take(message)
         except RigError as error:
             over = error
-        except OSError as error:
-            over = rig_error("daemon_gone", text=error)
         finally:
             with self._guard:
                 self._over, unanswered = over, [*self._open.values()]
@@ -141,7 +139,7 @@ class Line:
             self._notify(message["method"], message["params"])
             return
         if "error" in message and message.get("id") is None:  # it hangs up after this
-            raise rpc.error_of(message)
+            raise rpc.error_of(message["error"])
         answer = self._open.pop(message["id"], None)
         result = message.get("result")
         if isinstance(result, dict) and "state" in result:
@@ -149,7 +147,7 @@ class Line:
         if answer is None or not answer.set_running_or_notify_cancel():
             return
         if message.get("error") is not None:
-            answer.set_exception(rpc.error_of(message))
+            answer.set_exception(rpc.error_of(message["error"]))
         else:
             answer.set_result(result)
 
@@ -219,14 +217,12 @@ class Client:
             raise rig_error("no_session_open")
         return self._session
 
-    def open_session(
-        self, protocol: str, session: str, seed: int | None = None
-    ) -> tuple[int, int] | None:
+    def open_session(self, protocol: str, session: str, seed: int | None = None) -> Job | None:
         """Have a session opened, and open it for reading here."""
         source, path = str(Path(protocol).resolve()), Path(session).resolve()
         opened = self.call("open_session", protocol=source, session=str(path), seed=seed)
         self._session, fetched = Session.open(path, readonly=True), opened["fetched"]
-        return None if fetched is None else (fetched[0], fetched[1])
+        return fetched and Job(*fetched)
 
     def close_session(self) -> None:
         """Have the session closed."""
@@ -256,9 +252,7 @@ class Client:
             raise rig_error("not_recorded", run=run, attempt=attempt)
         return drop
 
-    def log_state(
-        self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...] = ()
-    ) -> None:
+    def log_state(self, run: int, attempt: int, state: RunState, reasons: Reasons = ()) -> None:
         """Log a verdict."""
         records = [reason.record() for reason in reasons]
         self.call("log_state", run=run, attempt=attempt, state=str(state), reasons=records)
@@ -346,16 +340,6 @@ class AsyncClient:
         self.changed()
 
 
-def _message_of(line: bytes) -> dict[str, Any]:
-    try:
-        message = json.loads(line)
-    except ValueError:
-        message = None
-    if not isinstance(message, dict):
-        raise rig_error("not_a_daemon")
-    return message
-
-
 def _result(answer: Future[Any], patience_s: float, silent: RigError) -> Any:
     for _ in range(math.ceil(patience_s / _HEED_S)):
         if wait([answer], _HEED_S).done:
@@ -384,8 +368,7 @@ def _reach(path: Path) -> socket.socket:
             line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, patience)
             line.connect(str(path))
         except BlockingIOError as error:
-            busy = rig_error("daemon_busy", path=path, patience_s=_REACH_S)
-            raise busy from error
+            raise rig_error("daemon_busy", path=path, patience_s=_REACH_S) from error
         except OSError as error:
             raise rig_error("no_daemon", path=path, text=error) from error
         stack.pop_all()

@@ -1,7 +1,5 @@
 """The rig as its clients see it: through the daemon that owns the port, or without one."""
 
-from __future__ import annotations
-
 import logging
 import os
 from collections.abc import Callable
@@ -78,11 +76,8 @@ def connect(
     RigError
         The daemon that was named is not there or has another port; another client is in control.
     """
-    path = default_socket() if socket is None else socket
-    if socket is None and not path.exists():
-        return Client(OwnLine(url), interrupts)
     try:
-        line = Line(path, f"rig run {os.getpid()}")
+        line = Line(socket or default_socket(), f"rig run {os.getpid()}")
         # A board has several names in /dev, and plugged in again another than the daemon was told.
         names = {Path(line.daemon.get(name, "")).resolve() for name in ("port", "path")}
         if Path(url).resolve() not in names:
@@ -91,7 +86,7 @@ def connect(
     except RigError:
         if socket is not None:
             raise
-        # Another port's daemon, what a killed one left, or one of another version.
+        # None, another port's daemon, what a killed one left, or one of another version.
         return Client(OwnLine(url), interrupts)
     client = Client(line, interrupts)
     try:

@@ -1,13 +1,11 @@
 """One client of the daemon: its lines, its turn, and what it has not read yet."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 from rig.daemon import rpc
-from rig.errors import RigError
 from rig.reasons import rig_error
 
 Message: TypeAlias = rpc.Request | rpc.RpcError
@@ -19,6 +17,7 @@ CLIENTS = 128
 """Connections beyond those may only `stop`, and no longer than `HELLO_S`."""
 
 
+@dataclass(eq=False, repr=False)
 class Connection:
     """One client.
 
@@ -47,43 +46,40 @@ class Connection:
         Whether it was too slow for them.
     """
 
-    def __init__(
-        self,
-        reader: asyncio.StreamReader,
-        writer: asyncio.StreamWriter,
-        do: Callable[[Connection, Message], Awaitable[Any]],
-        heard: Callable[[Connection], None],
-        turns: asyncio.Lock,
-    ) -> None:
-        self.name = ""
-        self.is_client = self.subscribed = self.behind = False
-        self._reader = reader
-        self._writer = writer
-        self._do = do
-        self._heard = heard
-        self._turns = turns
-        self._urgent: set[asyncio.Task[None]] = set()
-        self._waiting: asyncio.Queue[Message] = asyncio.Queue(rpc.WAITING_LIMIT)
+    reader: asyncio.StreamReader
+    writer: asyncio.StreamWriter
+    do: Callable[["Connection", Message], Awaitable[Any]]
+    heard: Callable[["Connection"], None]
+    turns: asyncio.Lock
+    name: str = ""
+    is_client: bool = False
+    subscribed: bool = False
+    behind: bool = False
+    _urgent: set[asyncio.Task[None]] = field(default_factory=set)
+    _waiting: asyncio.Queue[Message] = field(
+        default_factory=lambda: asyncio.Queue(rpc.WAITING_LIMIT)
+    )
 
     def send(self, line: bytes) -> None:
         """Send one message, some time."""
-        if not self._writer.is_closing():
-            self._writer.write(line)
+        if not self.writer.is_closing():
+            self.writer.write(line)
 
     def waiting(self) -> int:
         """Count the bytes that the client has not taken yet."""
-        return self._writer.transport.get_write_buffer_size()
+        return self.writer.transport.get_write_buffer_size()
 
     def close(self) -> None:
         """Hang up, without waiting for a client that does not read."""
-        self._writer.close()
+        self.writer.close()
         if self.waiting():
-            self._writer.transport.abort()
+            self.writer.transport.abort()
 
-    def turn_away(self, why: RigError) -> None:
-        """Say why, and hang up."""
-        self.send(rpc.failure(None, why))
-        self.close()
+    def hurry(self) -> None:
+        """Say to whoever was not let in that it is late, and hang up."""
+        if not self.is_client:
+            self.send(rpc.failure(None, rig_error("hello_late", patience_s=HELLO_S)))
+            self.close()
 
     async def serve(self) -> None:
         """Answer until the client goes."""
@@ -100,10 +96,10 @@ class Connection:
                 task.cancel()
 
     async def _read(self) -> None:
-        while line := await self._reader.readline():
-            self._heard(self)
+        while line := await self.reader.readline():
+            self.heard(self)
             if self.waiting() > rpc.UNREAD_LIMIT:
-                await self._writer.drain()
+                await self.writer.drain()
             self._take(rpc.read_line(line))
             await asyncio.sleep(0)  # many lines are there already: others' are read between them
 
@@ -124,17 +120,17 @@ class Connection:
     async def _answer_all(self) -> None:
         while True:
             message = await self._waiting.get()
-            async with self._turns:
+            async with self.turns:
                 await asyncio.sleep(0)
             await self._answer(message)
-            await self._writer.drain()
+            await self.writer.drain()
             if not self.name:
                 self.close()
                 return
 
     async def _answer(self, message: Message) -> None:
         try:
-            line = rpc.answer(message.id, await self._do(self, message))
+            line = rpc.answer(message.id, await self.do(self, message))
         except Exception as error:
             line = rpc.failure(message.id, error)
         self.send(line)

@@ -1,7 +1,5 @@
 """Control: one client at a time has it, and a client that is gone does not."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable

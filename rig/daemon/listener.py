@@ -1,7 +1,5 @@
 """Where clients come in: a socket, and nobody else's in its place."""
 
-from __future__ import annotations
-
 import socket
 from contextlib import suppress
 from errno import EADDRINUSE

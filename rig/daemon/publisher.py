@@ -1,7 +1,5 @@
 """The published state on its way to the clients that subscribed to it."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Iterable
 from functools import partial

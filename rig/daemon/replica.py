@@ -1,7 +1,5 @@
 """A client's copy of the daemon's state, as API.md describes it; without any I/O."""
 
-from __future__ import annotations
-
 from typing import Any
 
 

@@ -1,10 +1,8 @@
 """JSON-RPC 2.0, one message a line, and errors as data: a client shows what the daemon raised."""
 
-from __future__ import annotations
-
 import json
 import logging
-from typing import Any, Literal, NoReturn
+from typing import Any, Literal
 
 import msgspec
 
@@ -60,7 +58,8 @@ class Request(msgspec.Struct, frozen=True, kw_only=True):
 def read_line(line: bytes) -> Request | RpcError:
     """Read one line from a client."""
     try:
-        message = json.loads(line, parse_constant=_no_number)
+        # What is made of NaN and Infinity, which JSON does not have, is an error.
+        message = json.loads(line, parse_constant=int)
     except (ValueError, RecursionError):
         return RpcError(PARSE, "not JSON")
     try:
@@ -70,10 +69,6 @@ def read_line(line: bytes) -> Request | RpcError:
         known = isinstance(number, int | float | str) and not isinstance(number, bool)
         text = one_line(f"not a request of JSON-RPC 2.0: {error}", 200)
         return RpcError(INVALID, text, number if known else None)
-
-
-def _no_number(text: str) -> NoReturn:
-    raise ValueError(text)
 
 
 def request(method: str, params: dict[str, Any], number: int | None) -> bytes:
@@ -95,14 +90,6 @@ def failure(number: object, error: Exception) -> bytes:
         failed = in_words(error)
         data = {"code": FAILURE, "message": failed.message, "data": error_to_data(failed)}
     return _line({"jsonrpc": "2.0", "id": number, "error": data})
-
-
-def error_of(message: dict[str, Any]) -> RigError:
-    """Make the error of an answer that is one."""
-    error = message["error"]
-    if isinstance(error.get("data"), dict):
-        return error_from_data(error["data"])
-    return rig_error("not_understood", text=str(error.get("message")))
 
 
 def in_words(error: Exception) -> RigError:
@@ -127,8 +114,11 @@ def error_to_data(error: RigError) -> dict[str, Any]:
     } | {name: getattr(value, "name", value) for name, value in refusal.items()}
 
 
-def error_from_data(data: dict[str, Any]) -> RigError:
-    """Make the error again; one of a kind this program does not know is a `RigError`."""
+def error_of(member: dict[str, Any]) -> RigError:
+    """Make the error that an answer has; of a kind this program does not know it is `RigError`."""
+    data = member.get("data")
+    if not isinstance(data, dict):
+        return rig_error("not_understood", text=str(member.get("message")))
     if data.get("kind") == "DeviceRefusedError":
         disarmed = DisarmReason[data["disarmed"]] if data.get("disarmed") else None
         return DeviceRefusedError(RefusalReason[data["reason"]], data["detail"], disarmed)

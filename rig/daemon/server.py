@@ -1,7 +1,5 @@
 """The daemon's life: clients on a local socket, served beside the worker and never in its way."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
 import os
@@ -10,6 +8,7 @@ import socket
 import sys
 from collections.abc import Awaitable, Callable, Coroutine, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,6 @@ from rig.daemon import rpc
 from rig.daemon.connection import HELLO_S, Connection
 from rig.daemon.lease import LEASE_S
 from rig.daemon.listener import Door
-from rig.daemon.rpc import error_to_data
 from rig.daemon.service import Service
 from rig.daemon.socket_path import peer_uid
 from rig.errors import InputError
@@ -36,6 +34,7 @@ _LOOK_S = LEASE_S / 20
 """Between two looks whether control has lapsed, the worker goes on, and clients find the socket."""
 
 
+@dataclass(eq=False, repr=False)
 class Server:
     """One daemon.
 
@@ -52,25 +51,19 @@ class Server:
         What else follows the published state in the server's loop; it must not fail.
     """
 
-    def __init__(
-        self,
-        url: str,
-        path: Path,
-        *,
-        idle_s: float | None = None,
-        onlookers: Sequence[Onlooker] = (),
-    ) -> None:
-        self.url = url
-        self.path = path
-        self.service = Service(url)
+    url: str
+    path: Path
+    idle_s: float | None = None
+    onlookers: Sequence[Onlooker] = ()
+    _turns: asyncio.Lock = field(default_factory=asyncio.Lock)
+    _left_at: float = 0.0  # when somebody was there last, or something under way
+    _stall: dict[str, Any] | None = None  # as published
+    _serving: set[asyncio.Task[None]] = field(default_factory=set)
+    _over: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def __post_init__(self) -> None:
+        self.service = Service(self.url)
         self.published, self._worker = self.service.published, self.service.worker
-        self._turns = asyncio.Lock()
-        self._idle_s = idle_s
-        self._onlookers = onlookers
-        self._left_at = 0.0  # when somebody was there last, or something under way
-        self._stall: dict[str, Any] | None = None  # as published
-        self._serving: set[asyncio.Task[None]] = set()
-        self._over = asyncio.Event()
 
     async def run(self, ready: Callable[[], None]) -> None:
         """Serve until a signal comes, or until nobody needs it.
@@ -93,10 +86,9 @@ class Server:
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, self.end)
         door = Door(self.path)
-        self.published.set(
-            daemon={"version": __version__, "pid": os.getpid(), "api": rpc.API},
-            port={"url": self.url, "simulated": is_simulated(self.url), "path": self.url},
-        )
+        about = {"version": __version__, "pid": os.getpid(), "api": rpc.API}
+        port = {"url": self.url, "simulated": is_simulated(self.url), "path": self.url}
+        self.published.set(daemon=about, port=port)
         ready()  # said before whatever the worker has to say
         self._worker.start()
         parts: list[Awaitable[Any]] = [
@@ -105,7 +97,7 @@ class Server:
             self._accept(door.listener),
             self.service.publisher.run(),
             self._watch(door),
-            *(onlooker(self.published) for onlooker in self._onlookers),
+            *(onlooker(self.published) for onlooker in self.onlookers),
         ]
         tasks = [asyncio.ensure_future(part) for part in parts]
         try:
@@ -159,21 +151,16 @@ class Server:
             line.close()
             return
         reader, writer = await asyncio.open_connection(sock=line, limit=rpc.REQUEST_LIMIT)
-        connection = Connection(
-            reader, writer, self.service.do, self.service.lease.heard, self._turns
-        )
+        do, heard = self.service.do, self.service.lease.heard
+        connection = Connection(reader, writer, do, heard, self._turns)
         self.service.connections.add(connection)
-        late = loop.call_later(HELLO_S, self._hurry, connection)
+        late = loop.call_later(HELLO_S, connection.hurry)
         try:
             await connection.serve()
         finally:
             late.cancel()
             self.service.forget(connection)
             connection.close()
-
-    def _hurry(self, connection: Connection) -> None:
-        if not connection.is_client:
-            connection.turn_away(rig_error("hello_late", patience_s=HELLO_S))
 
     # ------------------------------------------------------------------ what is looked at
 
@@ -188,22 +175,16 @@ class Server:
         self._left_at = asyncio.get_running_loop().time()
         while True:
             await asyncio.sleep(_LOOK_S)
-            self._see_lease()
+            self.service.show_control()  # it lapses also when its holder says nothing
             self._see_worker()
             self._see_rest()
             if not (door.there() or self.published.get("clients")):
                 raise rig_error("socket_lost", path=door.path, folder=state_folder())
 
-    def _see_lease(self) -> None:
-        """See that control lapses also when its holder says nothing."""
-        if self.published.get("control") is not None and self.service.lease.holder is None:
-            self._worker.wake()
-        self.service.show_control()
-
     def _see_worker(self) -> None:
         """Tell every client when nothing is known any more, and when it is again."""
         stall, before = self._worker.stall(), self._stall
-        self._stall = None if stall is None else error_to_data(stall)
+        self._stall = None if stall is None else rpc.error_to_data(stall)
         if stall is not None:
             if before is None:
                 log.warning("%s (%s)", stall.message, stall.hint)
@@ -215,13 +196,9 @@ class Server:
         """End when no client was there for so long and nothing is armed, falling or unsaved."""
         now, state = asyncio.get_running_loop().time(), self.published.get
         drop, error = state("drop") or {}, state("error") or {}
-        if (
-            state("clients")
-            or state("phase") not in {"idle", "trouble"}
-            or drop.get("state") in {"armed", "fired"}
-            or error.get("kind") == "SessionError"
-        ):
+        is_held = drop.get("state") in {"armed", "fired"} or error.get("kind") == "SessionError"
+        if is_held or state("clients") or state("phase") not in {"idle", "trouble"}:
             self._left_at = now
-        elif self._idle_s is not None and now - self._left_at >= self._idle_s:
-            log.info("no client for %g s; nothing armed, falling or unsaved", self._idle_s)
+        elif self.idle_s is not None and now - self._left_at >= self.idle_s:
+            log.info("no client for %g s; nothing armed, falling or unsaved", self.idle_s)
             self.end()

@@ -1,10 +1,7 @@
 """The methods of the interface, see API.md: one table of what they do, take and need."""
 
-from __future__ import annotations
-
 import asyncio
 import logging
-import os
 from collections.abc import Callable
 from functools import partial
 from inspect import isawaitable
@@ -97,14 +94,15 @@ class Service:
     def release(self, client: Connection) -> None:
         """Take control away from a client, when it has it."""
         if self.lease.release(client):
-            self.worker.wake()
             self.show_control()
 
     def show_control(self) -> None:
-        """Show who is in control now."""
+        """Show who is in control now; what was armed by whoever lost it is disarmed."""
         control = None if self.lease.holder is None else {"client": self.lease.name}
         if control != self.published.get("control"):
             log.info("in control: %s", control["client"] if control else "nobody")
+            if control is None:
+                self.worker.wake()
         self.published.set(control=control)
 
 
@@ -149,14 +147,8 @@ def _hello(service: Service, caller: Connection, api: object, client: str) -> di
         caller.is_client = others < CLIENTS
         service.publisher.count()
     caller.name = one_line(client, 80) or "a client"
-    port = service.published.get("port")
-    return {
-        "api": rpc.API,
-        "version": __version__,
-        "pid": os.getpid(),
-        "port": port["url"],
-        "path": port["path"],
-    }
+    daemon, port = service.published.get("daemon"), service.published.get("port")
+    return {**daemon, "port": port["url"], "path": port["path"]}
 
 
 def _take_control(service: Service, client: Connection) -> None:

@@ -1,7 +1,5 @@
 """Where a daemon is found, and that nobody else's is taken for it."""
 
-from __future__ import annotations
-
 import os
 import socket
 import struct
@@ -67,5 +65,4 @@ def peer_uid(connection: socket.socket) -> int | None:
     if option is None or connection.family != socket.AF_UNIX:
         return None
     data = connection.getsockopt(socket.SOL_SOCKET, option, _CREDENTIALS.size)
-    uid: int = _CREDENTIALS.unpack(data)[1]
-    return uid
+    return int(_CREDENTIALS.unpack(data)[1])

@@ -5,8 +5,6 @@ trouble of the link or the disk becomes a state that every client sees, and ends
 worker connects again, with growing pauses, and settles what was under way.
 """
 
-from __future__ import annotations
-
 import logging
 import math
 import queue
@@ -92,14 +90,12 @@ class Worker:
         if self._thread.ident is None:
             self._thread.start()
 
-    def submit(
-        self, work: Callable[[Controller], Any], holder: object, *, writes: bool = True
-    ) -> Future[Any]:
+    def submit(self, do: Callable[..., Any], holder: object, *, writes: bool = True) -> Future[Any]:
         """Have something done, when what was asked for before is done.
 
         Parameters
         ----------
-        work
+        do
             Called with the controller, in the worker's thread.
         holder
             The client that must be in control at that moment.
@@ -112,7 +108,7 @@ class Worker:
             self._holder = holder
             if writes and isinstance(self._trouble, SessionError):
                 raise self._trouble
-            return work(self.controller)
+            return do(self.controller)
 
         outcome: Future[Any] = Future()
         self._jobs.put(_Job(in_control, outcome))

@@ -3,8 +3,6 @@
 No release is driven, and no drop of anybody is touched.
 """
 
-from __future__ import annotations
-
 import cmath
 from collections.abc import Mapping, Sequence
 from math import tau

@@ -3,8 +3,6 @@
 A check returns what is well, in words, or raises why it is not. No port is opened.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

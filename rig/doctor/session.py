@@ -1,14 +1,12 @@
 """Checks of a session file: whether it is whole, and what its board did meanwhile."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from rig.link.messages import unpack_label
 from rig.link.transcript import Restart, causes
-from rig.records import Drop, Job
+from rig.records import Drop
 from rig.recover.examine import examine
 from rig.selftest.findings import Finding, fail_if, make_check
 from rig.session.drop_check import ByteReplay
@@ -57,7 +55,7 @@ def check_restarts(restarts: Iterable[Restart], drops: Iterable[Drop]) -> str:
     """
     times: Counter[str] = Counter()
     for restart in restarts:
-        job = "" if restart.label is None else f"{Job(*unpack_label(restart.label))}: "
+        job = "" if restart.label is None else f"{unpack_label(restart.label)}: "
         times[job + restart.when + causes(restart.cause)] += 1
     for drop in drops:
         if drop.certificate and drop.certificate.restarts:

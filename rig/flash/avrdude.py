@@ -1,13 +1,10 @@
 """Calling avrdude, showing what it says, and saying what went wrong."""
 
-from __future__ import annotations
-
 import os
-from collections.abc import Callable
 from contextlib import suppress
 from subprocess import DEVNULL, PIPE, STDOUT, Popen, TimeoutExpired
 
-from rig.flash.boards import Target
+from rig.flash.boards import Say, Target
 from rig.flash.image import Image
 from rig.link.port import open_port
 from rig.reasons import errors_become, rig_error
@@ -24,9 +21,7 @@ _CAUSES = {
 }
 
 
-def write_flash(
-    target: Target, port: str, path: str | None, image: Image, say: Callable[[str], None]
-) -> None:
+def write_flash(target: Target, port: str, path: str | None, image: Image, say: Say) -> None:
     """Write an image into a board's flash; avrdude reads it back and compares.
 
     Parameters
@@ -59,9 +54,7 @@ def write_flash(
     writing = ["-D", "-P", port, "-U", f"flash:w:{image.path}:i"]
     command = [avrdude, *target.avrdude.split(), *writing]
     with errors_become("program_failed", OSError, path=avrdude):
-        child = Popen(
-            command, text=True, errors="replace", stdin=DEVNULL, stdout=PIPE, stderr=STDOUT
-        )
+        child = Popen(command, errors="replace", stdin=DEVNULL, stdout=PIPE, stderr=STDOUT)
     output = None
     while output is None:
         with suppress(TimeoutExpired):

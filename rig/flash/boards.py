@@ -1,15 +1,17 @@
 """The boards that can be flashed: how, and what they call themselves."""
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from rig.boards import MEGA, PICO, UNO, Capabilities
 from rig.ready import find_resource
 
 UNSEEN = "never seen on hardware: please tell us how it goes (docs/first-board.md)"
 """Said of every board until somebody has: then it becomes an attribute of `Target`."""
+
+Say: TypeAlias = Callable[[str], None]
+"""Tells whoever looks on what happens."""
 
 
 class Target(NamedTuple):

@@ -1,25 +1,20 @@
 """A Pico that waits for firmware: the drive that it shows, and copying a file to it."""
 
-from __future__ import annotations
-
 import os
 import re
 import time
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rig.errors import DeviceError
-from rig.flash.boards import DRIVE
+from rig.flash.boards import DRIVE, Say
+from rig.flash.image import Image
 from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.port import open_port, port_clock
 from rig.reasons import rig_error
 from rig.usb.listing import serial_ports
-
-if TYPE_CHECKING:
-    from rig.flash.image import Image
 
 _ABOUT = "INFO_UF2.TXT"  # the boot program's file about the board
 _BOARD = "RPI-RP2"
@@ -55,9 +50,7 @@ def pico_ports() -> set[str]:
     return {p.path for p in serial_ports() if p.candidate and DRIVE.board.name in p.kinds}
 
 
-def copy_firmware(
-    port: str | None, folder: str | None, image: Image, say: Callable[[str], None]
-) -> str:
+def copy_firmware(port: str | None, folder: str | None, image: Image, say: Say) -> str:
     """Copy firmware to a Pico's drive. It takes it block by block and restarts at the last.
 
     Parameters
@@ -108,7 +101,7 @@ def copy_firmware(
     raise rig_error("no_pico_port")
 
 
-def _ask_to_wait(port: str | None, say: Callable[[str], None]) -> None:
+def _ask_to_wait(port: str | None, say: Say) -> None:
     """Ask the one Pico that runs to take firmware, which it does when it has nothing else to do."""
     paths = [port] if port else [*pico_ports()]
     if len(paths) != 1:
@@ -133,8 +126,7 @@ def _choose_drive(folder: str | None) -> Path:
     if not drives:
         raise rig_error("pico_unmounted" if sees_boot_pico() else "no_pico")
     if len(drives) > 1:
-        names = ", ".join(map(str, drives))
-        raise rig_error("many_picos", count=len(drives), names=names)
+        raise rig_error("many_picos", count=len(drives), names=", ".join(map(str, drives)))
     return drives[0]
 
 

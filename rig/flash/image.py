@@ -4,8 +4,6 @@ Both names are read from the image itself, where the firmware keeps them for `Id
 board must answer after flashing is written down nowhere a second time.
 """
 
-from __future__ import annotations
-
 import re
 import struct
 from collections.abc import Iterator

@@ -1,12 +1,9 @@
 """Flashing a board, from the file to the handshake."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from contextlib import closing
 
 from rig.flash.avrdude import write_flash
-from rig.flash.boards import TARGETS
+from rig.flash.boards import TARGETS, Say
 from rig.flash.drive import copy_firmware
 from rig.flash.image import read_image
 from rig.link.client import Device
@@ -15,9 +12,7 @@ from rig.link.port import open_port, port_clock
 from rig.reasons import rig_error
 
 
-def flash(
-    board: str, port: str | None, image: str | None, way: str | None, say: Callable[[str], None]
-) -> Identity:
+def flash(board: str, port: str | None, image: str | None, way: str | None, say: Say) -> Identity:
     """Flash a board and verify it.
 
     Parameters

@@ -1,11 +1,8 @@
 """Puts one drop together from the messages about it, in whatever order they come."""
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
-from functools import cache
 from typing import Any
 
 import msgspec
@@ -80,8 +77,10 @@ class Assembly:
 
     def sound(self) -> bool:
         """Whether every event and the certificate are in and agree."""
-        certificate = self.certificate
-        return certificate is not None and not self.missing() and self._crc() == certificate.crc32
+        if self.certificate is None or self.missing():
+            return False
+        events = map(self._events.__getitem__, range(self.certificate.events))
+        return zlib.crc32(wire.pack_events(events)) == self.certificate.crc32
 
     def forget_events(self, latest: int) -> None:
         """Drop the latest so many events, to read them again."""
@@ -101,14 +100,12 @@ class Assembly:
         Drop
             With a fault for everything that is not as it should be.
         """
-        run, attempt = wire.unpack_label(self.label)
         seen = self.certificate
         fire_tick = seen.fire_tick if seen else self.fire_tick
         # A device arms only with its gates clear, so 0 stands in where no certificate came.
         initial = seen.initial_state if seen else 0
         return Drop(
-            run=run,
-            attempt=attempt,
+            *wire.unpack_label(self.label),
             tick_hz=tick_hz,
             edges=self._edges(initial, fire_tick),
             fire_tick=fire_tick,
@@ -116,11 +113,6 @@ class Assembly:
             certificate=_account(seen) if seen else None,
             faults=tuple(self._faults(tick_hz)),
         )
-
-    def _crc(self) -> int:
-        """CRC-32 over all events, as they are on the wire; none is missing."""
-        total = self.certificate.events if self.certificate else 0
-        return zlib.crc32(wire.pack_events(map(self._events.__getitem__, range(total))))
 
     def _edges(self, state: int, fire_tick: int | None) -> tuple[Edge, ...]:
         if fire_tick is None:
@@ -144,7 +136,7 @@ class Assembly:
         if missing := self.missing():
             code = "events_overwritten" if missing[0] < self.first_kept else "events_missing"
             yield make_reason(code, missing=len(missing), events=seen.events, first=missing[0])
-        elif self._crc() != seen.crc32:
+        elif not self.sound():
             yield make_reason("crc_mismatch")
         if seen.overflows:
             yield make_reason("edges_lost", lost=seen.overflows)
@@ -177,15 +169,9 @@ def edges(
     values = [
         (ticks_since(fire_tick, tick), channel, state >> channel & 1 == 1)
         for (tick, state), old in zip(events, before, strict=False)
-        for channel in _channels((old ^ state) & gates)
+        for channel in wire.channels_of((old ^ state) & gates)
     ]
     return msgspec.convert(values, tuple[Edge, ...])  # in a third of the time of one by one
-
-
-@cache
-def _channels(mask: int) -> list[int]:
-    """List the channels of a mask of 16 bits."""
-    return [n for n in range(GATES) if mask >> n & 1]
 
 
 def ticks_since(fire_tick: int, tick: int) -> int:

@@ -1,8 +1,5 @@
 """The host's side of the conversation: requests, repeats, and the reading of a drop."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 
@@ -10,7 +7,7 @@ from rig.boards import LONGEST_RECORD_MS
 from rig.errors import DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.assembly import Assembly
-from rig.link.exchange import Exchange
+from rig.link.exchange import Exchange, Halted
 from rig.link.frames import DELIMITER
 from rig.link.port import BAUDRATE
 from rig.link.refusals import DeviceRefusedError
@@ -185,9 +182,7 @@ class Device(Exchange):
         """
         self.request(wire.Acknowledge(label, crc32), wire.Done)
 
-    def collect(
-        self, label: int, timeout: float | None = None, stop: Callable[[], bool] | None = None
-    ) -> Drop:
+    def collect(self, label: int, timeout: float | None = None, stop: Halted | None = None) -> Drop:
         """Wait for a fired drop and read it whole.
 
         Parameters

@@ -1,12 +1,10 @@
 """Requests and their answers: repeats, time-outs, and the reading of the port."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import serial
 
@@ -19,8 +17,10 @@ from rig.link.transcript import Direction, Incoming, Record, Restart, Transcript
 from rig.reasons import rig_error
 
 Answer = TypeVar("Answer", bound=wire.DeviceMessage)
+Halted: TypeAlias = Callable[[], bool]
+"""Asked all the time whether what is under way shall end."""
 
-_FIRST_WAIT_S = 0.1
+_WAIT_S = 0.1  # for the first answer
 _LONGEST_WAIT_S = 0.5
 _BACK_OFF = 1.5
 _PAST_SEQ = 255
@@ -92,11 +92,7 @@ class Exchange:
     _past: deque[tuple[int, bytes]] = field(default_factory=deque)  # what `abort_past` sent
 
     def request(
-        self,
-        message: wire.HostMessage,
-        expected: type[Answer],
-        tries: int | None = None,
-        wait: float = _FIRST_WAIT_S,
+        self, message: wire.HostMessage, kind: type[Answer], tries: int = 0, wait: float = _WAIT_S
     ) -> Answer:
         """Send a request until it is answered; every repeat has the same seq.
 
@@ -104,10 +100,10 @@ class Exchange:
         ----------
         message
             The request.
-        expected
+        kind
             Which message answers it.
         tries
-            How often to send it, if not as often as usual.
+            How often to send it; 0 for as often as usual.
         wait
             How long to wait for the first answer, s; longer from try to try.
 
@@ -134,7 +130,7 @@ class Exchange:
             self.write(data)
             answer = self.wait_for(wait, lambda got: got.ack == seq)
             wait = min(wait * _BACK_OFF, _LONGEST_WAIT_S)
-            if isinstance(answer, expected):
+            if isinstance(answer, kind):
                 return answer
             if isinstance(answer, wire.Refused):
                 raise DeviceRefusedError(answer.reason, answer.detail, self.transcript.disarmed)
@@ -183,9 +179,8 @@ class Exchange:
             data = self.port.read(min(max(1, self.port.in_waiting), _AT_ONCE))
         self.rx_bytes += len(data)
         if self.rx_bytes > STRANGE_BYTES and self.transcript.identity is None:
-            lacking = (
-                "and no word of who is there" if self.transcript.rx.good else "that are no frames"
-            )
+            good = self.transcript.rx.good
+            lacking = "and no word of who is there" if good else "that are no frames"
             raise rig_error("bytes_strange", size_mb=self.rx_bytes / 1e6, lacking=lacking)
         self._part += data
         # A line gives single bytes, and half a frame says nothing.

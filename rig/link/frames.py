@@ -5,8 +5,6 @@ zero always means "a frame ends here" and a receiver is in step again after one 
 check is CRC-16/CCITT-FALSE over everything before it, little-endian like all numbers here.
 """
 
-from __future__ import annotations
-
 from binascii import crc_hqx
 from typing import NamedTuple
 
@@ -93,10 +91,8 @@ def cobs_decode(stuffed: bytes) -> bytes:
     FrameError
         When the bytes contain a zero, are empty, too many, or end within a block.
     """
-    if len(stuffed) >= FRAME_LIMIT:
-        raise FrameError("longer than a frame can be")
-    if not stuffed or 0 in stuffed:
-        raise FrameError("not COBS: empty, or with a zero inside")
+    if not 0 < len(stuffed) < FRAME_LIMIT or 0 in stuffed:
+        raise FrameError("not COBS: empty, longer than a frame can be, or with a zero inside")
     # In place: every code byte but the first stands where a zero was. This loop is most of what
     # reading a frame takes.
     body = bytearray(stuffed)

@@ -18,19 +18,19 @@ simply be made anew. All gates of ARM must be clear then and at FIRE, so `initia
 armed gates is 0; the other gates are left out of every event.
 """
 
-from __future__ import annotations
-
 import struct
 import typing
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields
 from enum import IntEnum
+from functools import cache
 from itertools import starmap
 from typing import Annotated, Any, NamedTuple, TypeAlias, dataclass_transform
 
-from rig.boards import Capabilities
+from rig.boards import GATES, Capabilities
 from rig.errors import DeviceError
 from rig.link.frames import PAYLOAD_LIMIT
+from rig.records import Job
 
 PROTOCOL_VERSION = 2
 HOST_SILENCE_MS = 250
@@ -61,6 +61,12 @@ def pack_events(events: Iterable[tuple[int, int]]) -> bytes:
     return b"".join(starmap(EVENT.pack, events))
 
 
+@cache
+def channels_of(mask: int) -> list[int]:
+    """List the channels of a mask of gates."""
+    return [n for n in range(GATES) if mask >> n & 1]
+
+
 class UnsignedInt(NamedTuple):
     """An unsigned little-endian integer of `size` bytes."""
 
@@ -72,10 +78,8 @@ class UnsignedInt(NamedTuple):
 
     def unpack(self, payload: bytes, at: int) -> tuple[int, int]:
         """Read a value; give where the next one starts, too."""
-        value = payload[at : at + self.size]
-        if len(value) < self.size:
-            raise ValueError(f"{len(value)} bytes of records of {self.size}")
-        return int.from_bytes(value, "little"), at + self.size
+        value, end = Raw(self.size).unpack(payload, at)
+        return int.from_bytes(value, "little"), end
 
 
 class Raw(NamedTuple):
@@ -175,7 +179,7 @@ class PulseEnd(IntEnum):
     DEVICE = 3  # the device, to be safe: its main loop stood still, or the pin did not obey
 
 
-TABLE: dict[int, type[Message]] = {}
+TABLE: dict[int, type["Message"]] = {}
 """Every message by its code."""
 
 
@@ -323,6 +327,12 @@ class State(DeviceMessage, code=0x83):
     label: U32
     events: U16
 
+    @property
+    def drop(self) -> Job | None:
+        """The drop that it records or holds; `None` where there is none."""
+        has_drop = self.phase in {Phase.RECORDING, Phase.HOLDING}
+        return unpack_label(self.label) if has_drop else None
+
 
 class Armed(DeviceMessage, code=0x84):
     """Answer to ARM."""
@@ -440,9 +450,8 @@ class DropCertificate2(DropCertificate, code=0x8D):
 def _wire_fields(message: type[Any]) -> tuple[Field, ...]:
     """List a message's fields in wire order."""
     hints = typing.get_type_hints(message, include_extras=True)
-    return tuple(
-        Field(field.name, *typing.get_args(hints[field.name])[:2]) for field in fields(message)
-    )
+    names = [field.name for field in fields(message)]
+    return tuple(Field(name, *typing.get_args(hints[name])[:2]) for name in names)
 
 
 CODES = {message: code for code, message in TABLE.items()}
@@ -535,7 +544,7 @@ def pack_label(run: int, attempt: int) -> int:
     return run | attempt << 16
 
 
-def unpack_label(label: int) -> tuple[int, int]:
+def unpack_label(label: int) -> Job:
     """Undo `pack_label`.
 
     Parameters
@@ -545,7 +554,7 @@ def unpack_label(label: int) -> tuple[int, int]:
 
     Returns
     -------
-    int, int
+    Job
         Run and attempt.
     """
-    return label & 0xFFFF, label >> 16
+    return Job(label & 0xFFFF, label >> 16)

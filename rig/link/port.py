@@ -1,12 +1,10 @@
 """Opening a port by name or URL: ``/dev/ttyACM0``, ``sim://``, ``socket://HOST:PORT``."""
 
-from __future__ import annotations
-
 import errno
 import socket
 import warnings
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, TypeAlias
 from urllib.parse import urlsplit
 
 import serial
@@ -28,23 +26,8 @@ _PEEK = 1 << 16  # bytes; more than a session reads at once
 _NETWORK = ("socket", "rfc2217")  # URL schemes of ports at another computer
 
 
-class Port(Protocol):
-    """What this program needs of a pyserial port; its rate in bit/s counts only on a UART."""
-
-    baudrate: int
-
-    @property
-    def in_waiting(self) -> int:
-        """Bytes that can be read at once."""
-
-    def read(self, size: int = ..., /) -> bytes:
-        """Read up to `size` bytes, waiting no longer than the port's time-out."""
-
-    def write(self, data: bytes, /) -> int | None:
-        """Write bytes."""
-
-    def close(self) -> None:
-        """Close the port."""
+Port: TypeAlias = serial.Serial
+"""What pyserial makes of any URL; its rate in bit/s counts only on a UART."""
 
 
 def open_port(url: str) -> Port:

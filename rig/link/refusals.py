@@ -1,10 +1,7 @@
 """What a refusal means, and what the user can do about it."""
 
-from __future__ import annotations
-
-from rig.boards import GATES
 from rig.errors import DeviceError
-from rig.link.messages import PROTOCOL_VERSION, DisarmReason, RefusalReason
+from rig.link.messages import PROTOCOL_VERSION, DisarmReason, RefusalReason, channels_of
 from rig.reasons import make_reason, remedies
 
 
@@ -21,29 +18,21 @@ class DeviceRefusedError(DeviceError):
         Why the device had disarmed itself before, where that is the cause: it is not armed.
     """
 
-    def __init__(
-        self, reason: RefusalReason, detail: int, disarmed: DisarmReason | None = None
-    ) -> None:
+    def __init__(self, reason: RefusalReason, detail: int, disarmed: DisarmReason | None = None):
         if reason is not RefusalReason.NOT_ARMED:
             disarmed = None
         code = f"disarmed_{disarmed.name}" if disarmed else f"refused_{reason.name}"
-        why = make_reason(code.lower(), **_values(reason, detail))
+        values: dict[RefusalReason, dict[str, object]] = {
+            RefusalReason.GATE_BLOCKED: {"channels": channels_of(detail)},
+            RefusalReason.GATE_UNSTEADY: {"channels": channels_of(detail)},
+            RefusalReason.HOLDING_A_DROP: {"run": detail},
+            RefusalReason.VERSION: {"firmware": detail, "program": PROTOCOL_VERSION},
+            RefusalReason.COOLING: {"rest_s": detail / 1000},
+            RefusalReason.NOT_KEPT: {"first": detail},
+        }
+        why = make_reason(code.lower(), **values.get(reason, {}))
         super().__init__(why.text, *remedies([why]))
         self.reasons = (why,)
         self.reason = reason
         self.detail = detail
         self.disarmed = disarmed
-
-
-def _values(reason: RefusalReason, detail: int) -> dict[str, object]:
-    """Return what the detail of a refusal says."""
-    channels = [n for n in range(GATES) if detail >> n & 1]
-    values: dict[RefusalReason, dict[str, object]] = {
-        RefusalReason.GATE_BLOCKED: {"channels": channels},
-        RefusalReason.GATE_UNSTEADY: {"channels": channels},
-        RefusalReason.HOLDING_A_DROP: {"run": detail},
-        RefusalReason.VERSION: {"firmware": detail, "program": PROTOCOL_VERSION},
-        RefusalReason.COOLING: {"rest_s": detail / 1000},
-        RefusalReason.NOT_KEPT: {"first": detail},
-    }
-    return values.get(reason, {})

@@ -5,8 +5,6 @@ get the same drops by construction. How the bytes were cut into chunks matters o
 times of clock samples and for the lone delimiter with which a client begins a connection.
 """
 
-from __future__ import annotations
-
 from typing import Literal, NamedTuple, TypeAlias
 
 from rig.link import messages as wire
@@ -265,7 +263,5 @@ class Transcript:
         if opened_ns is not None:
             self._start_up_s = (host_ns - opened_ns) * 1e-9
             return []
-        if fired is None:
-            return [Restart(host_ns, cause)]
-        label, fired_ns = fired
+        label, fired_ns = fired or (None, host_ns)
         return [Restart(host_ns, cause, label, (host_ns - fired_ns) * 1e-9, self._start_up_s)]

@@ -1,7 +1,5 @@
 """Where a board is now: found again by its serial number, and never taken for another one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from rig.link.messages import Identity
@@ -50,17 +48,15 @@ class BoardLocator:
         DeviceError
             Another board is at the port that was named, or several have this serial number.
         """
-        self.path = self.url
-        if self.serial_number is None:
+        self.path, number = self.url, self.serial_number
+        ports = serial_ports() if number else []
+        present = serial_number_at(self.url, ports)
+        if number is None or number == present:
             return self.path
-        ports = serial_ports()
-        serial_number = serial_number_at(self.url, ports)
-        if serial_number == self.serial_number:
-            return self.path
-        if (path := path_of(self.serial_number, ports)) is not None:
+        if (path := path_of(number, ports)) is not None:
             self.path = path
-        elif serial_number is not None and self.bound:
-            text = f"serial number {serial_number}, not {self.serial_number}"
+        elif present is not None and self.bound:
+            text = f"serial number {present}, not {number}"
             raise rig_error("other_board", port=self.url, difference=text)
         return self.path
 

@@ -1,13 +1,11 @@
 """What clients can ask for, carried out on one port and one session file by one thread."""
 
-from __future__ import annotations
-
 import logging
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from rig.errors import InputError, RigError, StoppedError
+from rig.link.exchange import Halted
 from rig.link.messages import TEST_RUN, Identity, RefusalReason
 from rig.link.port import Port
 from rig.link.refusals import DeviceRefusedError
@@ -21,12 +19,11 @@ from rig.recorder.board_locator import SERIAL_NUMBER, BoardLocator
 from rig.recorder.opening import describe_session, latest_board, open_for
 from rig.recorder.published import PublishedState, link_state
 from rig.recorder.recorder import NullSink, Recorder
-from rig.records import Drop
-from rig.session.schema import RunState
+from rig.records import Drop, Job
+from rig.session.schema import VERDICTS, Reasons, RunState
 from rig.session.store import Session
 
 log = logging.getLogger(__name__)
-_VERDICTS = (RunState.ACCEPTED, RunState.MARGINAL, RunState.VOID, RunState.REJECTED)
 
 
 class Controller:
@@ -51,13 +48,11 @@ class Controller:
         Run and attempt of a drop that fell and was not collected yet.
     """
 
-    def __init__(
-        self, url: str, published: PublishedState, halted: Callable[[], bool] = lambda: False
-    ) -> None:
+    def __init__(self, url: str, published: PublishedState, halted: Halted = lambda: False) -> None:
         self.url = url
         self.published = published
         self.recorder: Recorder | None = None
-        self.due: tuple[int, int] | None = None
+        self.due: Job | None = None
         self._halted = halted
         self._keep_port = not is_simulated(url)  # between sessions
         self.opened: Session | None = None
@@ -65,7 +60,7 @@ class Controller:
         self._line_url = url  # with all that a simulation is told
         self._locator = BoardLocator(url)
         self._unarmed: RigError | None = None  # why what was armed is not
-        self._lost: dict[tuple[int, int], RigError] = {}  # why a drop is not in the session
+        self._lost: dict[Job, RigError] = {}  # why a drop is not in the session
 
     # ------------------------------------------------------------------ sessions
 
@@ -83,13 +78,11 @@ class Controller:
         return self.opened
 
     @property
-    def armed(self) -> tuple[int, int] | None:
+    def armed(self) -> Job | None:
         """Run and attempt of the drop that waits for `fire`."""
         return None if self.recorder is None else self.recorder.armed
 
-    def open_session(
-        self, protocol: str, session: str, seed: int | None = None
-    ) -> tuple[int, int] | None:
+    def open_session(self, protocol: str, session: str, seed: int | None = None) -> Job | None:
         """Make a session or go on with one, connect, and settle what was left behind.
 
         Parameters
@@ -101,8 +94,8 @@ class Controller:
 
         Returns
         -------
-        tuple of int, or None
-            Run and attempt of a drop that was fetched from the device.
+        Job or None
+            Of a drop that was fetched from the device.
 
         Raises
         ------
@@ -195,11 +188,8 @@ class Controller:
         sink = NullSink() if self.opened is None else self.opened
         published, meet = self.published, self._locator.meet
         self.recorder = Recorder(sink, url, published, self._halted, meet, port)
-        published.set(
-            port={"url": self.url, "simulated": is_simulated(url), "path": self._locator.path},
-            link=link_state("up"),
-            phase="idle",
-        )
+        place = {"url": self.url, "simulated": is_simulated(url), "path": self._locator.path}
+        published.set(port=place, link=link_state("up"), phase="idle")
         identity = self.recorder.identity
         if port is None:
             log.info("up: %s, id %s", identity.board, identity.unique_id.hex())
@@ -211,13 +201,13 @@ class Controller:
         if recorder is not None:
             recorder.let_go()
 
-    def settle(self) -> tuple[int, int] | None:
+    def settle(self) -> Job | None:
         """Settle what an earlier connection left: a drop the device holds, a run without a record.
 
         Returns
         -------
-        tuple of int, or None
-            Run and attempt of the drop that was fetched.
+        Job or None
+            Of the drop that was fetched.
 
         Raises
         ------
@@ -225,26 +215,22 @@ class Controller:
             The device holds a drop of another session, or is in trouble.
         """
         recorder = self._require_recorder()
-        held = recorder.held()
-        if held is not None and held[0] == TEST_RUN:
+        held = recorder.device.status().drop
+        if held is not None and held.run == TEST_RUN:
             release_test.forget(recorder)
             held = None
         if held is not None:
             if held not in self.session.fired_ns():
-                run, attempt = held
-                raise rig_error("drop_of_another_session", run=run, attempt=attempt)
-            recorder.collect(*held, fresh=False)
+                raise rig_error("drop_of_another_session", **held._asdict())
+            recorder.collect(held, fresh=False)
             self._lost.pop(held, None)
-        for run, attempt in self._without_drop(RunState.ARMED, RunState.FIRED):
-            why = (make_reason("connection_ended"),)
-            recorder.state(run, attempt, RunState.INTERRUPTED, why)
+        latest = {entry.run: entry for entry in self.session.states()}
+        for run, attempt, state, *_ in latest.values():
+            is_begun = state in {RunState.ARMED, RunState.FIRED}
+            if is_begun and self.session.drop(run, attempt) is None:
+                why = (make_reason("connection_ended"),)
+                recorder.state(Job(run, attempt), RunState.INTERRUPTED, why)
         return held
-
-    def _without_drop(self, *states: RunState) -> list[tuple[int, int]]:
-        """List the attempts that are logged last in one of these states, with no drop stored."""
-        latest = {entry.run: entry for entry in self.session.states()}.values()
-        jobs = [(entry.run, entry.attempt) for entry in latest if entry.state in states]
-        return [job for job in jobs if self.session.drop(*job) is None]
 
     # ------------------------------------------------------------------ drops
 
@@ -274,17 +260,16 @@ class Controller:
             raise rig_error("not_next", run=run, attempt=attempt)
         self.session.require_presence()
         self._unarmed = None
-        return recorder.arm(run, attempt, protocol)
+        return recorder.arm(Job(run, attempt), protocol)
 
     def notice(self) -> None:
         """Log that the device has disarmed itself, when it has."""
         recorder = self.recorder
-        if recorder is not None and recorder.armed is not None:
-            reason = recorder.device.transcript.disarmed
-            if reason is not None:
-                refusal = DeviceRefusedError(RefusalReason.NOT_ARMED, 0, reason)
-                self.stop(*refusal.reasons)
-                self._unarmed = refusal
+        reason = recorder.device.transcript.disarmed if recorder and recorder.armed else None
+        if reason is not None:
+            refusal = DeviceRefusedError(RefusalReason.NOT_ARMED, 0, reason)
+            self.stop(*refusal.reasons)
+            self._unarmed = refusal
 
     def fire(self, token: int) -> None:
         """Let go. From here on the drop is collected whatever happens: call `finish`.
@@ -312,16 +297,14 @@ class Controller:
         RigError
             It could not be read or stored: the device still has it.
         """
-        if self.due is None:
+        due, self.due = self.due, None
+        if due is None:
             return
-        due = self.due
         try:
-            self._require_recorder().collect(*due)
+            self._require_recorder().collect(due)
         except RigError as error:
             self._lost[due] = error
             raise
-        finally:
-            self.due = None
 
     def collect(self, run: int, attempt: int) -> Drop:
         """Return a drop that fell, once it is in the session.
@@ -335,7 +318,7 @@ class Controller:
         drop = self.session.drop(run, attempt)
         if drop is None:
             missing = rig_error("not_recorded", run=run, attempt=attempt)
-            raise self._lost.get((run, attempt)) or missing
+            raise self._lost.get(Job(run, attempt)) or missing
         return drop
 
     def test_release(self) -> dict[str, Any]:
@@ -352,9 +335,7 @@ class Controller:
         self.published.set(release_test=result)
         return result
 
-    def log_state(
-        self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...] = ()
-    ) -> None:
+    def log_state(self, run: int, attempt: int, state: RunState, reasons: Reasons = ()) -> None:
         """Log a verdict on a recorded drop.
 
         Raises
@@ -362,16 +343,11 @@ class Controller:
         InputError
             No such drop, or no verdict.
         """
-        last = self.session.latest_state(run)
-        if (
-            state not in _VERDICTS
-            or last is None
-            or last.attempt != attempt
-            or self.session.drop(run, attempt) is None
-        ):
+        last, drop = self.session.latest_state(run), self.session.drop(run, attempt)
+        if last is None or drop is None or last.attempt != attempt or state not in VERDICTS:
             raise rig_error("cannot_judge", run=run, attempt=attempt, state=state)
         if (last.state, last.reasons) != (state, reasons):
-            self._require_recorder().state(run, attempt, state, reasons)
+            self._require_recorder().state(Job(run, attempt), state, reasons)
             self.session.settle()
 
     def stop(self, reason: Reason | str) -> None:
@@ -392,7 +368,7 @@ class Controller:
             recorder.abort()
         finally:
             if armed is not None:
-                recorder.state(*armed, RunState.INTERRUPTED, (why,))
+                recorder.state(armed, RunState.INTERRUPTED, (why,))
 
     def close(self) -> None:
         """Close session and port."""

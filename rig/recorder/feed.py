@@ -4,15 +4,13 @@ Provisional on purpose: frames that come out of order are left to the record, wh
 certificate vouches for.
 """
 
-from __future__ import annotations
-
 from rig.link import messages as wire
 from rig.link.assembly import ALL_GATES, edges
 from rig.link.transcript import Incoming, Record
 from rig.reasons import Reason, reasons_json
 from rig.recorder.published import PublishedState
-from rig.records import Drop, Edge
-from rig.session.schema import RunState
+from rig.records import Drop, Edge, Job
+from rig.session.schema import Reasons, RunState
 
 _PHASES = dict(zip(wire.Phase, ("idle", "armed", "recording", "storing"), strict=True))
 
@@ -52,20 +50,19 @@ class StateFeed:
             case wire.DropCertificate():
                 self._published.set(phase="storing")
 
-    def state(self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...]) -> None:
+    def state(self, job: Job, state: RunState, reasons: Reasons) -> None:
         """Take a line of the log of run states."""
-        self._published.run(
-            run, attempt=attempt, state=str(state), **reasons_json(reasons, Reason.record)
-        )
+        why = reasons_json(reasons, Reason.record)
+        self._published.run(job.run, attempt=job.attempt, state=str(state), **why)
         if state is RunState.ARMED:
-            self._label, self._gates = wire.pack_label(run, attempt), 0
+            self._label, self._gates = wire.pack_label(*job), 0
             self._published.replace_edges(())
-            self._begin(run, attempt, "armed")
+            self._begin(job, "armed")
             self._published.set(phase="armed")
         elif state is RunState.INTERRUPTED:
             self._label = 0
             drop = self._published.get("drop")  # perhaps of the connection before
-            if drop is not None and (drop["run"], drop["attempt"]) == (run, attempt):
+            if drop is not None and (drop["run"], drop["attempt"]) == job:
                 self._show(state="interrupted")
 
     def show_drop(self, drop: Drop) -> None:
@@ -73,7 +70,7 @@ class StateFeed:
         self._label = 0
         events = drop.certificate.events if drop.certificate else len(drop.edges)
         self._published.replace_edges(() if self._blind else map(_row, drop.edges))
-        self._begin(*drop.job, "recorded", drop.fire_tick, events)
+        self._begin(drop.job, "recorded", drop.fire_tick, events)
         self._published.set(phase="idle")
 
     @property
@@ -82,11 +79,9 @@ class StateFeed:
         session = self._published.get("session")
         return session is not None and bool(session["blind"])
 
-    def _begin(
-        self, run: int, attempt: int, state: str, fire_tick: int | None = None, events: int = 0
-    ) -> None:
-        job = {"run": run, "attempt": attempt, "tick_hz": self._tick_hz}
-        self._published.set(drop=job | {"state": state, "fire_tick": fire_tick, "events": events})
+    def _begin(self, job: Job, state: str, fire_tick: int | None = None, events: int = 0) -> None:
+        drop = job._asdict() | {"state": state, "tick_hz": self._tick_hz}
+        self._published.set(drop=drop | {"fire_tick": fire_tick, "events": events})
 
     def _show(self, **changes: object) -> None:
         self._published.set(drop=self._published.get("drop") | changes)

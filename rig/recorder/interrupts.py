@@ -1,7 +1,5 @@
 """Ctrl-C, SIGTERM and STOP: how what is under way is ended without tearing a record apart."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,9 +18,8 @@ class Interrupts:
     good.
     """
 
-    def __init__(self) -> None:
-        self._is_let_through = False
-        self._asked = 0
+    _is_let_through = False
+    _asked = 0
 
     @contextmanager
     def caught(self) -> Iterator[None]:

@@ -1,7 +1,5 @@
 """Making a session file, or finding that one can be gone on with."""
 
-from __future__ import annotations
-
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -46,9 +44,7 @@ def latest_board(session: Reader) -> dict[str, str]:
     return {name: str(value) for name, value in boards[-1].items()} if boards else {}
 
 
-def describe_session(
-    session: Reader, protocol: Protocol
-) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+def describe_session(session: Reader, protocol: Protocol) -> tuple[dict[str, Any], list[Any]]:
     """Describe a session and its plan as the sections ``session`` and ``runs`` of the state do."""
     plan = [line.json() for line in plan_lines(runs(protocol), session.states())]
     about = {

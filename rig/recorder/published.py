@@ -5,8 +5,6 @@ messages is put together into one, so the rate of messages is the reader's choic
 is that of the state itself, however fast the device talks.
 """
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -22,11 +20,7 @@ def link_state(state: str, error: object = None, retry_s: float | None = None) -
 
 
 _SHOWN = "daemon port device statistics gates drop release_test session control error"
-_FIRST: dict[str, Any] = dict.fromkeys(_SHOWN.split()) | {
-    "link": link_state("closed"),
-    "phase": "idle",
-    "clients": 0,
-}
+_FIRST: dict[str, Any] = {"link": link_state("closed"), "phase": "idle", "clients": 0}
 
 Edge3 = tuple[int, int, int]
 """Tick, channel, blocked."""
@@ -47,7 +41,7 @@ class PublishedState:
         self.changed: Callable[[], object] = lambda: None
         self.watched = False
         self._guard = threading.Lock()
-        self._sections = dict(_FIRST)
+        self._sections = dict.fromkeys(_SHOWN.split()) | _FIRST
         self._phase = "idle"  # of the device
         self._runs: dict[int, dict[str, Any]] = {}
         self._edges: list[Edge3] = []
@@ -109,17 +103,15 @@ class PublishedState:
             if self._clean:
                 return None
             self._n += 1
-            change: dict[str, Any] = {"n": self._n}
             state, dirty = self._state(), self._dirty
-            if replaced := {name: state[name] for name in state if name in dirty}:
-                change["set"] = replaced
-            if runs := [self._runs[number] for number in self._runs if number in dirty]:
-                change["runs"] = runs
-            if "edges" not in dirty and self._sent < len(self._edges):
-                change["edges"] = self._edges[self._sent :]
+            parts = {
+                "set": {name: state[name] for name in state if name in dirty},
+                "runs": [run for number, run in self._runs.items() if number in dirty],
+                "edges": [] if "edges" in dirty else self._edges[self._sent :],
+            }
             self._sent = len(self._edges)
             dirty.clear()
-            return change
+            return {"n": self._n} | {name: part for name, part in parts.items() if part}
 
     @contextmanager
     def _changing(self) -> Iterator[None]:

@@ -1,7 +1,5 @@
 """One device and one session file: what is measured is on the disk before it is let go of."""
 
-from __future__ import annotations
-
 import logging
 import random
 from collections.abc import Callable, Iterator
@@ -11,18 +9,18 @@ from typing import Any
 from rig.clock.host import HostWatch, SystemClock
 from rig.errors import DeviceError, SessionError, StoppedError
 from rig.link.client import BOOT_WAIT_S, Device
-from rig.link.messages import Arm, Identity, Phase, pack_label, unpack_label
+from rig.link.messages import Arm, Identity, pack_label
 from rig.link.port import Port, open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Direction, Record
 from rig.ports import told
 from rig.protocol.measurable import record_ms
 from rig.protocol.protocol import Protocol
-from rig.reasons import Reason, rig_error, sentences
+from rig.reasons import rig_error, sentences
 from rig.recorder.feed import StateFeed
 from rig.recorder.published import PublishedState
-from rig.records import ClockSample, Drop, Pulse
-from rig.session.schema import RunState
+from rig.records import ClockSample, Drop, Job, Pulse
+from rig.session.schema import Reasons, RunState
 from rig.session.store import Session
 
 log = logging.getLogger(__name__)
@@ -100,7 +98,7 @@ class Recorder:
         self._feed = StateFeed(published)
         self._halted = halted
         self._uneven = random.Random(0)
-        self.armed: tuple[int, int] | None = None
+        self.armed: Job | None = None
         self._sample: ClockSample | None = None  # the latest
         self._disk_must_not_matter = False
         self._is_endable = False  # whether a request may be left without its answer
@@ -182,19 +180,11 @@ class Recorder:
 
     def statistics(self) -> dict[str, object]:
         """Count what went over the line since it is up, see rig/daemon/API.md."""
-        trip = self._sample
-        return self.device.statistics() | {
-            "round_trip_s": None if trip is None else (trip.host_recv_ns - trip.host_send_ns) * 1e-9
-        }
+        sample = self._sample
+        trip_s = (sample.host_recv_ns - sample.host_send_ns) * 1e-9 if sample else None
+        return self.device.statistics() | {"round_trip_s": trip_s}
 
-    def held(self) -> tuple[int, int] | None:
-        """Run and attempt of a drop the device still holds, or `None`."""
-        state = self.device.status()
-        if state.phase in {Phase.HOLDING, Phase.RECORDING}:
-            return unpack_label(state.label)
-        return None
-
-    def arm(self, run: int, attempt: int, protocol: Protocol) -> int:
+    def arm(self, job: Job, protocol: Protocol) -> int:
         """Prepare a drop; the release stays off until `fire`. Until then wait with `wait` only.
 
         Returns
@@ -207,16 +197,15 @@ class Recorder:
         DeviceRefusedError
             A gate is blocked, or the device cannot do what the protocol asks.
         """
-        label = pack_label(run, attempt)
-        order = arm_order(protocol, label, ARM_TIMEOUT_MS, record_ms(protocol))
+        order = arm_order(protocol, pack_label(*job), ARM_TIMEOUT_MS, record_ms(protocol))
         try:
             with self._endable():
                 token = self.device.arm(order)
         except StoppedError:
             self.abort()  # the device may have heard what it did not answer
             raise
-        self.armed = run, attempt
-        self.state(run, attempt, RunState.ARMED)
+        self.armed = job
+        self.state(job, RunState.ARMED)
         return token
 
     def fire(self, token: int) -> None:
@@ -227,9 +216,9 @@ class Recorder:
         DeviceRefusedError
             Nothing was let go: a beam was disturbed, or the device has disarmed itself.
         """
-        run, attempt = self.armed or (0, 0)
+        job = self.armed or Job(0, 0)
         self.look()  # a slow disk may take most of the silence allowed, twice
-        self.state(run, attempt, RunState.FIRED)
+        self.state(job, RunState.FIRED)
         self.go_on()  # whoever asked to stop until now sees nothing fall
         try:
             with self._endable():
@@ -241,12 +230,12 @@ class Recorder:
             raise
         self.armed = None  # from here on there is a recording, which `let_go` leaves alone
 
-    def collect(self, run: int, attempt: int, *, fresh: bool = True) -> Drop:
+    def collect(self, job: Job, *, fresh: bool = True) -> Drop:
         """Read the drop whole, store it, and only then let the device forget it.
 
         Parameters
         ----------
-        run, attempt
+        job
             Of the drop.
         fresh
             Whether it has just been let go, so that STOP ends its recording; else it may be in the
@@ -257,17 +246,17 @@ class Recorder:
         DeviceError
             The session has another drop of this run and attempt, or the device is in trouble.
         """
-        label = pack_label(run, attempt)
+        label = pack_label(*job)
         timeout, stop = (None, self._halted) if fresh else (0.0, None)
         drop = self.device.collect(label, timeout, stop)
-        stored = self.session.drop(run, attempt)
+        stored = self.session.drop(*job)
         if stored is None:
             self.session.add_drop(drop, host_ns=self.clock.now_ns(), provenance="device")
-            self.state(run, attempt, RunState.RECORDED, drop.faults)
-            log.info("run %d, attempt %d: recorded, %d edges", run, attempt, len(drop.edges))
+            self.state(job, RunState.RECORDED, drop.faults)
+            log.info("%s: recorded, %d edges", job, len(drop.edges))
             self._feed.show_drop(drop)
         elif (stored.certificate, stored.fire_tick) != (drop.certificate, drop.fire_tick):
-            raise rig_error("drop_differs", run=run, attempt=attempt)
+            raise rig_error("drop_differs", **job._asdict())
         if drop.certificate is not None:
             self.device.acknowledge(label, drop.certificate.crc32)
             self.session.commit()
@@ -282,15 +271,13 @@ class Recorder:
         finally:
             self._disk_must_not_matter = False
 
-    def state(
-        self, run: int, attempt: int, state: RunState, reasons: tuple[Reason, ...] = ()
-    ) -> None:
+    def state(self, job: Job, state: RunState, reasons: Reasons = ()) -> None:
         """Log where a run stands, on the disk when this returns."""
-        self.session.add_state(run, attempt, state, self.clock.now_ns(), reasons)
+        self.session.add_state(*job, state, self.clock.now_ns(), reasons)
         self.session.commit()
         if state is RunState.INTERRUPTED:
-            log.info("run %d, attempt %d: interrupted: %s", run, attempt, sentences(reasons))
-        self._feed.state(run, attempt, state, reasons)
+            log.info("%s: interrupted: %s", job, sentences(reasons))
+        self._feed.state(job, state, reasons)
 
     def go_on(self) -> None:
         """Go on unless everything shall be off.
@@ -313,9 +300,9 @@ class Recorder:
             self._is_endable = False
 
     def _give_way(self) -> None:
-        is_halted = self._halted()  # also tells whoever owns this that the device is waited for
-        if is_halted and self._is_endable:
-            self.go_on()
+        # To ask also tells whoever owns this that the device is waited for.
+        if self._halted() and self._is_endable:
+            raise rig_error("switched_off")
 
     def _log(self, direction: Direction, host_ns: int, data: bytes) -> None:
         try:

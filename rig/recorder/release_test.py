@@ -1,12 +1,10 @@
 """The release driven once with nothing hung from it: a drop of no run, of which only bytes stay."""
 
-from __future__ import annotations
-
-from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
 from rig.errors import DeviceError
+from rig.link.exchange import Halted
 from rig.link.messages import TEST_RUN, Phase, pack_label
 from rig.protocol.protocol import Protocol
 from rig.recorder.recorder import Recorder, arm_order
@@ -16,7 +14,7 @@ _TIMEOUT_MS = 1000  # it is fired at once, or never
 _AFTER_MS = 500  # what falls or trembles because of the pulse has been seen by then
 
 
-def drive(recorder: Recorder, protocol: Protocol, halted: Callable[[], bool]) -> dict[str, Any]:
+def drive(recorder: Recorder, protocol: Protocol, halted: Halted) -> dict[str, Any]:
     """Arm and fire with the protocol's pulse, and look what the gates see of it.
 
     Parameters
@@ -60,7 +58,7 @@ def drive(recorder: Recorder, protocol: Protocol, halted: Callable[[], bool]) ->
         "release_sense_s": None if sensed is None else sensed / drop.tick_hz,
         "edges": len(drop.edges),
         "gates": sorted({edge.channel for edge in drop.edges}),
-        "faults": list(drop.faults),
+        "faults": [fault.text for fault in drop.faults],
     }
 
 
@@ -68,7 +66,7 @@ def forget(recorder: Recorder) -> None:
     """Let the device forget a test's drop, when it holds one: it would forbid the next."""
     device = recorder.device
     state = device.status()
-    if state.label != _LABEL or state.phase not in {Phase.RECORDING, Phase.HOLDING}:
+    if state.drop is None or state.label != _LABEL:
         return
     if state.phase is Phase.RECORDING:
         device.abort()

@@ -1,7 +1,5 @@
 """Where each planned run stands by the log of a session: for a plan, the daemon and its clients."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import astuple
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Recovery of drops from their stored rows and from the raw bytes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import groupby
 from operator import itemgetter
@@ -10,7 +8,7 @@ from typing import NamedTuple
 from rig.reasons import make_reason
 from rig.records import Drop
 from rig.recover.rows import Rows
-from rig.session.drop_check import ByteReplay, Fate, check_drop
+from rig.session.drop_check import WHOLE, ByteReplay, Fate, check_drop
 from rig.session.rows import drop_of, named_values
 
 
@@ -50,7 +48,7 @@ def recover_drops(rows: Rows) -> list[RecoveredDrop]:
 
 
 def _best(stored: Drop, replayed: Drop | None, fate: Fate) -> Drop:
-    if fate.whole:
+    if fate in WHOLE:
         return stored
     if replayed is not None and fate is Fate.RESTORED:
         return replayed

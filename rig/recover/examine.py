@@ -1,10 +1,8 @@
 """Examination of a session file: identity, damage, and readable drops."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from rig.printable import printable
 from rig.reasons import sentences
@@ -25,8 +23,7 @@ _FORMAT, _APPLICATION = 60, 68
 _OPEN = (RunState.ARMED, RunState.FIRED, RunState.RECORDED)
 
 
-@dataclass(frozen=True, slots=True)
-class ExaminedFile:
+class ExaminedFile(NamedTuple):
     """Result of the examination of a session file.
 
     Attributes

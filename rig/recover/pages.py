@@ -5,8 +5,6 @@ page is read independently. The format is https://www.sqlite.org/fileformat2.htm
 its sections.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator
 from typing import TypeAlias
@@ -84,7 +82,7 @@ def read_cells(pages: Pages, number: int) -> Iterator[Cell | None]:
     for place in range(pointers, pointers + 2 * count, 2):
         try:
             yield _cell(pages, page, kind, int.from_bytes(page[place : place + 2], "big"))
-        except (ValueError, IndexError):
+        except (ValueError, LookupError):
             yield None
 
 
@@ -116,9 +114,7 @@ def _payload(pages: Pages, page: bytes, kind: int, at: int, size: int) -> bytes:
     payload = bytearray(page[at:end])
     follow = page[end : end + pointer]
     while len(payload) < size:
-        over = pages.pages.get(int.from_bytes(follow, "big"))
-        if over is None:
-            raise ValueError("its end is missing")
+        over = pages.pages[int.from_bytes(follow, "big")]
         payload += over[4 : min(4 + size - len(payload), usable)]
         follow = over[:4]
     return bytes(payload)
@@ -129,12 +125,10 @@ def _record(payload: bytes) -> Iterator[Value]:
     body = header
     while at < header:
         kind, at = _varint(payload, at)
-        if kind in {10, 11}:
-            raise ValueError("no such type")
         size = _SIZES.get(kind, max(0, kind - 12) // 2)
         data = payload[body : body + size]
-        if len(data) != size:
-            raise ValueError("cut short")
+        if kind in {10, 11} or len(data) != size:
+            raise ValueError("of no such type, or cut short")
         body += size
         yield _value(kind, data)
     if at != header or body != len(payload):

@@ -1,7 +1,5 @@
 """Assignment of records to tables by their shape, as a damaged file may lack its schema."""
 
-from __future__ import annotations
-
 import hashlib
 from contextlib import suppress
 from dataclasses import dataclass, field

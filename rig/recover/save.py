@@ -1,7 +1,5 @@
 """Recovery: writes all readable data of a damaged session into a new session."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Snapshot of a session file, without changing it."""
 
-from __future__ import annotations
-
 import os
 import sqlite3
 from contextlib import closing

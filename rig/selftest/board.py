@@ -1,18 +1,15 @@
 """A board under test: the link's client, which asks anything and brings the board back to rest."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from typing import Any, NamedTuple, TypeAlias
 
-from rig.boards import GATES
 from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.exchange import Answer
 from rig.link.frames import Frame, encode
-from rig.link.messages import TEST_RUN, DisarmReason, Phase, RefusalReason, pack_label, unpack_label
+from rig.link.messages import TEST_RUN, DisarmReason, Phase, RefusalReason, pack_label
 from rig.link.port import Port, port_clock
 from rig.link.transcript import Record
 from rig.reasons import error_of, make_reason, rig_error
@@ -69,7 +66,7 @@ class GateStates(NamedTuple):
 
 def name_gates(mask: int) -> str:
     """Name the gates of a mask, as in ``gates 1, 8``."""
-    numbers = [str(n) for n in range(GATES) if mask >> n & 1]
+    numbers = [str(n) for n in wire.channels_of(mask)]
     return f"gate{'s' * (len(numbers) > 1)} {', '.join(numbers)}"
 
 
@@ -123,8 +120,7 @@ class BoardUnderTest(Device):
         NotPossibleError
             The emergency stop forbids it.
         """
-        self._seq = self._seq if again else self._seq % 254 + 1
-        seq = self._seq
+        seq = self._seq = self._seq if again else self._seq % 254 + 1
         code, payload = request if isinstance(request, tuple) else wire.pack(request)
         for _ in range(_TRIES):
             self.write(encode(Frame(code, seq, 0, payload)))
@@ -161,10 +157,8 @@ class BoardUnderTest(Device):
 
     def foreign_drop(self) -> dict[str, int]:
         """Give run and attempt of a session's drop that the board has; empty without one."""
-        state = self.state()
-        run, attempt = unpack_label(state.label)
-        busy = state.phase in {Phase.RECORDING, Phase.HOLDING} and run != TEST_RUN
-        return {"run": run, "attempt": attempt} if busy else {}
+        drop = self.state().drop
+        return {} if drop is None or drop.run == TEST_RUN else drop._asdict()
 
     def settle(self) -> None:
         """Bring the board to IDLE, and let it forget a drop of a self-test.

@@ -3,8 +3,6 @@
 Nothing falls. The last check needs a wire, from the sync output to a gate input.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from statistics import fmean, stdev
 
@@ -180,8 +178,7 @@ def measure_sync_edges(board: BoardUnderTest) -> str:
     gate = loopback or 0
     last = identity.gates - 1
     need(gate <= last, f"gate {gate}, and this board has gates 0 to {last}")
-    restless = board.gates.sometimes
-    fail_if(restless >> gate & 1, "sync_blocked", gate=gate)
+    fail_if(board.gates.sometimes >> gate & 1, "sync_blocked", gate=gate)
     late = []
     for _ in range(board.options.drops):
         edges, seal = board.drop(gates=1 << gate)

@@ -1,7 +1,5 @@
 """How a check of the self-test or the doctor can end."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from enum import StrEnum
@@ -73,8 +71,7 @@ def explain(name: str, error: RigError, verdict: Verdict = Verdict.FAILED) -> Fi
 def wrong_answer(request: str, expected: object, answer: object) -> RigError:
     """Return the failure of a board that gave another answer than expected."""
     expected, answer = (_ENUM.sub(r"\1", str(value)) for value in (expected, answer))
-    values = {"request": request, "expected": expected, "answer": answer}
-    return rig_error("wrong_answer", **values)
+    return rig_error("wrong_answer", request=request, expected=expected, answer=answer)
 
 
 def fail_if(broken: object, code: str, **values: object) -> None:

@@ -4,13 +4,10 @@ The other board's gates time the outputs of this one; its releases are this one'
 docs/first-board.md lists the wires.
 """
 
-from __future__ import annotations
-
 from statistics import stdev
 
 from rig.clock.epochs import RESONATOR_TOLERANCE
 from rig.link import messages as wire
-from rig.link.messages import DisarmReason, PulseEnd, RefusalReason
 from rig.selftest.board import BoardUnderTest, Check, RecordedDrop, name_gates
 from rig.selftest.checks import identify
 from rig.selftest.findings import fail_if, insist
@@ -96,12 +93,12 @@ class JudgeBoard(BoardUnderTest):
         for _ in range(max(1, board.options.drops // 4)):
             recorded, _ = self._pulse(board, STOP, 10_000, AT_STOP, **pulse)
             seal = recorded.certificate
-            insist("the stop in a pulse", PulseEnd(seal.pulse_end).name, "STOPPED")
+            insist("the stop in a pulse", seal.pulse_end.name, "STOPPED")
             ticks = seal.pulse_ticks - _changes(recorded, AT_STOP)[0]
             delays.append(1e6 / board.identity.tick_hz * ticks)
         worst = _limit("the stop acts after", delays, _STOP_LIMIT_US, "µs")
         recorded, _ = self._pulse(board, STOP, _SPIKE_US, AT_STOP, **pulse)
-        insist("a spike", PulseEnd(recorded.certificate.pulse_end).name, "ORDERED")
+        insist("a spike", recorded.certificate.pulse_end.name, "ORDERED")
         return f"after {worst:.0f} µs at most; {_SPIKE_US} µs are ignored"
 
     def open_stop(self, board: BoardUnderTest) -> None:
@@ -109,9 +106,9 @@ class JudgeBoard(BoardUnderTest):
         own = {"gates": AT_BEAMS}
         _, judge_token = self._arm_both(board, own, release=STOP, pulse_us=_LONG_US)
         self.fire(judge_token)
-        board.wait_disarmed("an open stop", DisarmReason.STOPPED, 0.1)
+        board.wait_disarmed("an open stop", wire.DisarmReason.STOPPED, 0.1)
         answer = board.request(board.order(**own), wire.DeviceMessage)
-        insist("Arm", answer, wire.Refused(RefusalReason.STOPPED, 0))
+        insist("Arm", answer, wire.Refused(wire.RefusalReason.STOPPED, 0))
         self.collect_drop()
 
     def disturb_beam(self, board: BoardUnderTest) -> None:
@@ -120,7 +117,7 @@ class JudgeBoard(BoardUnderTest):
         token, judge_token = self._arm_both(board, own, release=BEAMS, pulse_us=1000)
         self.fire(judge_token)
         self.collect_drop()
-        board.refuse(wire.Fire(token), RefusalReason.GATE_UNSTEADY, AT_BEAMS)
+        board.refuse(wire.Fire(token), wire.RefusalReason.GATE_UNSTEADY, AT_BEAMS)
 
     def _pulse(
         self, board: BoardUnderTest, output: int, length_us: int, gates: int, **own: int
@@ -140,8 +137,7 @@ class JudgeBoard(BoardUnderTest):
         # The judge goes on until the board has ended, which its sync output shows.
         order |= {"gates": gates, "record_ms": record_ms + 50}
         self.prepare(**order)
-        token = board.prepare(**own, record_ms=record_ms)
-        return token, self.prepare(**order)
+        return board.prepare(**own, record_ms=record_ms), self.prepare(**order)
 
 
 def _changes(recorded: RecordedDrop, gate: int) -> tuple[int, int]:

@@ -1,7 +1,5 @@
 """Checks of the line: round trips and the clock, silence, repeats, and junk."""
 
-from __future__ import annotations
-
 import random
 from itertools import pairwise
 from statistics import median

@@ -1,7 +1,5 @@
 """The checks in order, and what becomes of each."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from functools import partial
@@ -39,9 +37,7 @@ CHECKS: dict[str, Check] = {
 """Where a name is that of a phase, its check asks all that a board in that phase must answer."""
 
 
-def selftest(
-    port: Port, options: SelftestOptions, judge_port: Port | None = None
-) -> Iterator[Finding]:
+def selftest(port: Port, options: SelftestOptions, judge: Port | None = None) -> Iterator[Finding]:
     """Make every check, one after the other.
 
     Parameters
@@ -50,7 +46,7 @@ def selftest(
         Open.
     options
         What may be done.
-    judge_port
+    judge
         The open port of a second board that is wired to this one.
 
     Yields
@@ -58,7 +54,7 @@ def selftest(
     Finding
         As soon as it is known. When the board is silent the rest is not possible.
     """
-    judges = [JudgeBoard(each, options) for each in [judge_port] if each]
+    judges = [JudgeBoard(each, options) for each in [judge] if each]
     by_judge = judges[0].checks() if judges else {}
     table = {name: check for name, check in CHECKS.items() if name not in by_judge} | by_judge
     yield from run_checks(table, BoardUnderTest(port, options), *judges)

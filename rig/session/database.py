@@ -1,7 +1,5 @@
 """Creation and opening of a session's SQLite file, with checks for foreign files."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import sqlite3
@@ -106,9 +104,8 @@ def copy_session(path: Path, folder: Path) -> Path:
     OSError
         It cannot be read, or there is no room for it.
     """
-    copy = folder / "copy"
+    copy = shutil.copyfile(path, folder / "copy")
     log = beside(path, "-wal")
-    shutil.copyfile(path, copy)
     if log.is_file() and log.stat().st_size:
         shutil.copyfile(log, folder / "copy-wal")
     return copy

@@ -3,8 +3,6 @@
 All readers of drops, for results or for recovery, use this check.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, replace
@@ -14,7 +12,7 @@ from typing import Any
 
 from rig.link.messages import TEST_RUN, pack_events
 from rig.link.transcript import Direction, Incoming, Restart, Transcript
-from rig.records import Certificate, ClockSample, Drop, Edge, Job, Pulse
+from rig.records import Certificate, ClockSample, Drop, Job, Pulse
 
 _LATER = [field.name for field in fields(Certificate) if field.default is None]
 """Fields that certificates of older formats do not have."""
@@ -29,10 +27,9 @@ class Fate(StrEnum):
     RESTORED = "put together again from its bytes"
     PARTIAL = "not whole: neither the record nor the bytes have all of it"
 
-    @property
-    def whole(self) -> bool:
-        """Whether the stored record counts as the recorded one."""
-        return self in {Fate.CONFIRMED, Fate.IMPORTED, Fate.UNCONFIRMED}
+
+WHOLE = {Fate.CONFIRMED, Fate.IMPORTED, Fate.UNCONFIRMED}
+"""Fates for which the stored record counts as the recorded one."""
 
 
 class ByteReplay:
@@ -62,14 +59,10 @@ class ByteReplay:
         """Return the drops that the host acknowledged, without test runs."""
         return [told for told in self.records if isinstance(told, Drop) and told.run != TEST_RUN]
 
-    def unfinished_drops(self) -> list[Drop]:
-        """Return the received parts of drops that were never acknowledged, without test runs."""
-        return [drop for drop in self._transcript.unfinished_drops() if drop.run != TEST_RUN]
-
     def drops(self) -> dict[Job, Drop]:
-        """Return the latest version of every drop."""
-        drops = [*self.unfinished_drops(), *self.acknowledged_drops()]
-        return {drop.job: drop for drop in drops}
+        """Return the latest version of every drop, as far as it was received, without test runs."""
+        drops = [*self._transcript.unfinished_drops(), *self.acknowledged_drops()]
+        return {drop.job: drop for drop in drops if drop.run != TEST_RUN}
 
 
 def check_drop(stored: Drop, replayed: Mapping[Job, Drop]) -> Fate:
@@ -128,14 +121,9 @@ def _account_holds(drop: Drop, seen: Certificate) -> bool | None:
         return False
     if len(events) < seen.events or drop.fire_tick is None:
         return None
-    return _crc32(drop, drop.fire_tick, events) == seen.crc32
-
-
-def _crc32(drop: Drop, fire_tick: int, events: Iterable[tuple[int, list[Edge]]]) -> int:
-    """Return the CRC-32 of the events of these edges, see `rig.link.assembly.edges`."""
     state, snapshots = drop.initial_state, []
-    for tick, edges in events:
+    for tick, edges in events:  # what `rig.link.assembly.edges` makes of them, undone
         for _, channel, blocked in edges:
             state = state | 1 << channel if blocked else state & ~(1 << channel)
-        snapshots.append(((fire_tick + tick) & 0xFFFF_FFFF, state))
-    return zlib.crc32(pack_events(snapshots))
+        snapshots.append(((drop.fire_tick + tick) & 0xFFFF_FFFF, state))
+    return zlib.crc32(pack_events(snapshots)) == seen.crc32

@@ -1,7 +1,5 @@
 """Translation of errors with a session file into messages with a remedy."""
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -4,8 +4,6 @@ SQLite would expand a view in place of a table, run triggers, and compute genera
 schema is compared with the known schema before the first row is read.
 """
 
-from __future__ import annotations
-
 import sqlite3
 from contextlib import closing
 from functools import cache

@@ -5,8 +5,6 @@ SHA-256 of the previous hash and the new rows. The chain has no secret: an alter
 by a new chain, or by a cut at its end. Only a signature of the whole file prevents that.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import sqlite3

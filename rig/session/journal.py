@@ -1,7 +1,5 @@
 """Journal of writes, kept in memory until they are on disk, so that a full disk loses no data."""
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -52,11 +50,15 @@ class Journal:
         self._applied = 0  # number of pending records in the open transaction
         self.begun_s: float | None = None
         self._chain_end: ChainEnd | None = None  # end of the committed chain, once known
+        self._refusal: Exception | None = None  # of the last refused record of a write
 
     @contextmanager
     def _writing(self) -> Iterator[None]:
-        """Time a write; if the disk fails, the next write applies all pending records anew."""
-        self.begun_s = monotonic()
+        """Time a write; if the disk fails, the next write applies all pending records anew.
+
+        If a record is refused, all others are written, and then the error is raised.
+        """
+        self.begun_s, self._refusal = monotonic(), None
         try:
             yield
         except sqlite3.Error as error:
@@ -64,6 +66,8 @@ class Journal:
             raise as_session_error(self._path, error) from error
         finally:
             self.begun_s = None
+        if self._refusal is not None:
+            raise as_session_error(self._path, self._refusal) from self._refusal
 
     def add(self, record: Record) -> None:
         """Put rows into the open transaction, all or none of them.
@@ -80,9 +84,7 @@ class Journal:
         self.pending.append(record)
         if not failed:
             with self._writing():
-                refusal = self._run()
-            if refusal is not None:
-                raise as_session_error(self._path, refusal) from refusal
+                self._run()
 
     def commit(self) -> None:
         """Write all added records to the disk.
@@ -127,18 +129,15 @@ class Journal:
         return refused
 
     def _commit(self) -> None:
-        refusal = self._run()
+        self._run()
         if self._connection.in_transaction:
             end = extend_chain(self._connection, self._chain_end)
             self._connection.execute("COMMIT")
             self._chain_end = end
         self.pending.clear()
-        if refusal is not None:
-            raise as_session_error(self._path, refusal) from refusal
 
-    def _run(self) -> Exception | None:
-        """Apply pending records; drop refused ones, and return the last error."""
-        refusal: Exception | None = None
+    def _run(self) -> None:
+        """Apply pending records; drop refused ones, and keep the last error."""
         if not self._connection.in_transaction:
             self._applied = 0
             self._connection.execute("BEGIN IMMEDIATE")
@@ -147,10 +146,9 @@ class Journal:
                 self._apply(self.pending[self._applied])
             except _BAD_ROW as error:
                 del self.pending[self._applied]
-                refusal = error
+                self._refusal = error
             else:
                 self._applied += 1
-        return refusal
 
     def _apply(self, record: Record) -> None:
         # Even one executemany can fail half-way through its rows.

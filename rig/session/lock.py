@@ -1,7 +1,5 @@
 """Writer lock of a session: an advisory lock that ends with its process."""
 
-from __future__ import annotations
-
 import errno
 import os
 import time
@@ -49,8 +47,7 @@ class WriterLock:
             if has_fcntl:  # on other systems a locked file cannot be written
                 self.path.write_text(f"{os.getpid()}\n", "ascii")
         except Timeout:
-            holder = _holder(self.path)
-            raise rig_error("session_in_use", path=session, holder=holder) from None
+            raise rig_error("session_in_use", path=session, holder=_holder(self.path)) from None
         except SessionError:
             raise
         except OSError as error:

@@ -1,7 +1,5 @@
 """Check that the file at a path is still the open file, not moved, replaced or deleted."""
 
-from __future__ import annotations
-
 import os
 from contextlib import suppress
 from pathlib import Path

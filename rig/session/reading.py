@@ -1,7 +1,5 @@
 """Reader of a session: raw records, the log of run states, and metadata."""
 
-from __future__ import annotations
-
 import hashlib
 import sqlite3
 from collections import deque
@@ -11,22 +9,20 @@ from datetime import datetime
 from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from rig.boards import GATES
 from rig.errors import RigError
-from rig.reasons import Reason, rig_error
+from rig.link.transcript import Direction
+from rig.reasons import errors_become, rig_error
 from rig.records import ClockSample, Drop, HostBreak, Job, Pulse
-from rig.session.drop_check import ByteReplay, check_drop
+from rig.session.drop_check import WHOLE, ByteReplay, check_drop
 from rig.session.faults import translate_errors
 from rig.session.foreign import limit_steps
 from rig.session.rows import RowError, check_rows, drop_of, named_values
-from rig.session.schema import TABLES, Row, RunState, read_identity, read_reasons
+from rig.session.schema import TABLES, Reasons, Row, RunState, read_identity, read_reasons
 
 T = TypeVar("T")
-Direction = Literal["rx", "tx"]
-"""``rx``: from the device to the host; ``tx``: from the host to the device."""
-
 
 UNBLINDED = "unblinded"
 """The only key of the metadata that may be added later."""
@@ -34,8 +30,6 @@ MOST_EDGES = 1 << 22
 """Most edges of a drop without a certificate: no working timer gives more in an hour."""
 _AT_ONCE = 1024
 """Rows fetched at once."""
-_AFTER = "WHERE id > ? ORDER BY id"
-"""SQL for the rows after a given number: rows are never deleted, so numbers have no gaps."""
 _ALWAYS = {"created", "rig_version", "simulated", "origin", "protocol_sha256"}
 
 
@@ -46,7 +40,7 @@ class StateEntry(NamedTuple):
     attempt: int
     state: RunState
     host_ns: int
-    reasons: tuple[Reason, ...]
+    reasons: Reasons
 
 
 class ByteChunk(NamedTuple):
@@ -154,23 +148,23 @@ class Reader:
 
         The iterator reads them lazily.
         """
-        return self._records(ByteChunk, "bytes", _AFTER, after)
+        return self._records(ByteChunk, "bytes", after)
 
     def pings(self, after: int = 0) -> list[ClockSample]:
         """Return the clock samples in order, without the first `after`."""
-        return [*self._records(ClockSample, "ping", _AFTER, after)]
+        return [*self._records(ClockSample, "ping", after)]
 
     def pulses(self) -> list[Pulse]:
         """Return all recorded pulses of the 1 Hz reference, in order."""
-        return [*self._records(Pulse, "reference", _AFTER, 0)]
+        return [*self._records(Pulse, "reference")]
 
     def host_breaks(self) -> list[HostBreak]:
         """Return all breaks of the host's clock (sleep, or clock set), in order."""
-        return [*self._records(HostBreak, "host_break", _AFTER, 0)]
+        return [*self._records(HostBreak, "host_break")]
 
     def attached_files(self) -> list[AttachedFile]:
         """Return all attached files, in order."""
-        return [*self._records(AttachedFile, "attachment", _AFTER, 0)]
+        return [*self._records(AttachedFile, "attachment")]
 
     def drops(self, replay: ByteReplay | None = None) -> Iterator[Drop]:
         """Return all recorded drops in the order of recording, checked against their bytes.
@@ -197,10 +191,9 @@ class Reader:
         drops = (drop for drop in self.drops() if run in {None, drop.run})
         return [*{drop.run: drop for drop in sorted(drops, key=lambda drop: drop.job)}.values()]
 
-    def states(self, run: int | None = None, after: int = 0) -> list[StateEntry]:
-        """Return the log of run states in order, of all runs or of one, without the first few."""
-        which = "WHERE ?1 IS NULL OR run = ?1 ORDER BY id LIMIT -1 OFFSET ?2"
-        return [*self._records(_state, "run_state", which, run, after)]
+    def states(self, after: int = 0) -> list[StateEntry]:
+        """Return the log of run states in order, without the first `after`."""
+        return [*self._records(_state, "run_state", after)]
 
     def fired_ns(self) -> dict[tuple[int, int], int]:
         """Return the host time of firing from the log of states, by run and attempt."""
@@ -208,8 +201,8 @@ class Reader:
 
     def latest_state(self, run: int) -> StateEntry | None:
         """Return the latest state of a run; `None` if it has none."""
-        which = "WHERE run = ? ORDER BY id DESC LIMIT 1"
-        return next(self._records(_state, "run_state", which, run), None)
+        rows = self._rows("run_state", "WHERE run = ? ORDER BY id DESC LIMIT 1", run)
+        return next((_state(*row[1:]) for row in rows), None)
 
     def check(self) -> None:
         """Read all records once.
@@ -259,16 +252,15 @@ class Reader:
             self._check(table, rows)
             yield from rows
 
-    def _records(
-        self, kind: Callable[..., T], table: str, which: str, *args: object
-    ) -> Iterator[T]:
-        return (kind(*row[1:]) for row in self._rows(table, which, *args))
+    def _records(self, kind: Callable[..., T], table: str, after: int = 0) -> Iterator[T]:
+        """Return the records of a table in order, without the first `after`."""
+        # Rows are never deleted, so their numbers have no gaps.
+        rows = self._rows(table, "WHERE id > ? ORDER BY id", after)
+        return (kind(*row[1:]) for row in rows)
 
     def _check(self, table: str, rows: Sequence[Row]) -> None:
-        try:
+        with errors_become("session_wrong", RowError, path=self.path):
             check_rows(table, rows)
-        except RowError as error:
-            raise self._damage(str(error)) from error
 
     def _protocol(self) -> Row:
         row = next(self._rows("protocol"), None)
@@ -281,7 +273,7 @@ class Reader:
         try:
             check_rows("drop", [row])
             stored = drop_of(row, self._edges(row))
-            if check_drop(stored, replayed).whole:
+            if check_drop(stored, replayed) in WHOLE:
                 return stored
             why = stored.damage or "its edges do not agree with its bytes or its certificate"
         except RowError as error:

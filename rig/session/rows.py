@@ -1,7 +1,5 @@
 """Rows of a session: checks by column, and conversion between a drop and its rows."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from typing import Any

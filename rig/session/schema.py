@@ -3,8 +3,6 @@
 Triggers prevent changes of raw records.
 """
 
-from __future__ import annotations
-
 import json
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -35,6 +33,9 @@ OLDER = "older"
 _OLD_NOTE = "note: "
 
 
+Reasons: TypeAlias = tuple[Reason, ...]
+
+
 class RunState(StrEnum):
     """State of a planned run; the log of states is append-only."""
 
@@ -47,6 +48,10 @@ class RunState(StrEnum):
     VOID = "void"
     REJECTED = "rejected"
     INTERRUPTED = "interrupted"
+
+
+VERDICTS = (RunState.ACCEPTED, RunState.MARGINAL, RunState.VOID, RunState.REJECTED)
+"""States that judge a recorded drop."""
 
 
 class _Kind(NamedTuple):
@@ -122,18 +127,15 @@ def write_reasons(reasons: Iterable[Reason]) -> str:
     return encodable(json.dumps([reason.record() for reason in reasons], ensure_ascii=False))
 
 
-def read_reasons(text: str) -> tuple[Reason, ...]:
+def read_reasons(text: str) -> Reasons:
     """Return the reasons of a text by `write_reasons`, or of a list of sentences of an old file.
 
     Raises
     ------
-    TypeError, ValueError
+    TypeError, ValueError, msgspec.ValidationError
         The text is neither.
     """
-    rows = json.loads(text)
-    if not isinstance(rows, list):
-        raise TypeError(f"{text:.40} is no list of reasons")
-    return tuple(map(_read_reason, rows))
+    return tuple(map(_read_reason, msgspec.convert(json.loads(text), list)))
 
 
 def _read_reason(row: object) -> Reason:
@@ -196,6 +198,8 @@ class SessionTable:
 
     Attributes
     ----------
+    name
+        Its name.
     columns
         Columns in order; those of later formats come last.
     since
@@ -214,17 +218,19 @@ class SessionTable:
         Statement that adds a row of all columns; an empty id is numbered.
     """
 
-    def __init__(self, name: str, since: int, meaning: str, rows: list[str]) -> None:
-        self._name, self.since, self.meaning = name, since, meaning
+    def __init__(self, head: str, rows: list[str]) -> None:
+        words, _, self.meaning = head.partition(": ")
+        self.name, *since = words.split()
+        self.since = int(*since or "1")
         unique = rows.pop(0).removeprefix("  = ") if rows[0].startswith("  = ") else "id"
         self._key, *self._also = unique.split(" | ")
         self.key = len(self._key.split(", "))
         self.order = self._key if self.key > 1 else "rowid"
-        self.columns = [TableColumn(row, since) for row in rows]
+        self.columns = [TableColumn(row, self.since) for row in rows]
         self.numbered = rows[0].split()[2] == "row"
-        self.lengths = {len(self.names(n)) for n in range(since, SCHEMA_VERSION + 1)}
+        self.lengths = {len(self.names(n)) for n in range(self.since, SCHEMA_VERSION + 1)}
         values = ", ".join("?" * len(rows))
-        self.insert = f'INSERT INTO "{name}" VALUES ({values})'  # noqa: S608 - of tables.txt
+        self.insert = f'INSERT INTO "{self.name}" VALUES ({values})'  # noqa: S608 - of tables.txt
 
     def names(self, version: int = SCHEMA_VERSION) -> list[str]:
         """Return the names of a format's columns."""
@@ -232,7 +238,7 @@ class SessionTable:
 
     def script(self, version: int) -> str:
         """Return the script that creates the table in a format."""
-        name, parts = self._name, [c.sql for c in self.columns if c.since <= version]
+        name, parts = self.name, [c.sql for c in self.columns if c.since <= version]
         parts += [f"UNIQUE ({columns})" for columns in self._also]
         parts += [f"PRIMARY KEY ({self._key})"] if self.key > 1 else []
         taken = " OR ".join([_same(self._key), *(f"({_same(columns)})" for columns in self._also)])
@@ -251,16 +257,8 @@ def _same(columns: str) -> str:
     return " AND ".join(f"{name} = NEW.{name}" for name in columns.split(", "))
 
 
-def _read_tables() -> dict[str, SessionTable]:
-    tables = {}
-    for head, *rows in read_paragraphs(__file__, "tables.txt"):
-        words, _, meaning = head.partition(": ")
-        name, *since = words.split()
-        tables[name] = SessionTable(name, int(*since or "1"), meaning, rows)
-    return tables
-
-
-TABLES = _read_tables()
+_TABLES = [SessionTable(head, rows) for head, *rows in read_paragraphs(__file__, "tables.txt")]
+TABLES = {table.name: table for table in _TABLES}
 """Tables by name, in the order in which a commit's rows are hashed."""
 
 _BESIDES = """

@@ -1,7 +1,5 @@
 """The session: an SQLite file with all records of an experiment, in order."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import logging
@@ -20,6 +18,7 @@ from typing import Self
 from rig import __version__
 from rig.errors import InputError, RigError, SessionError
 from rig.files import make_folder, state_folder
+from rig.link.transcript import Direction
 from rig.printable import encodable
 from rig.reasons import Reason, rig_error
 from rig.records import ClockSample, Drop, HostBreak, Pulse
@@ -28,7 +27,7 @@ from rig.session.faults import translate_errors
 from rig.session.journal import Journal
 from rig.session.lock import WriterLock
 from rig.session.presence import Presence
-from rig.session.reading import UNBLINDED, Direction, Reader
+from rig.session.reading import UNBLINDED, Reader
 from rig.session.rows import rows_of
 from rig.session.schema import TABLES, Record, RunState, write_reasons
 
@@ -56,21 +55,15 @@ class Session(Reader, AbstractContextManager["Session"]):
 
     @classmethod
     def create(
-        cls,
-        path: str | os.PathLike[str],
-        protocol_text: str,
-        protocol_source: str,
-        *,
-        simulated: bool,
-        origin: str,
-    ) -> Session:
+        cls, path: str | os.PathLike[str], text: str, source: str, *, simulated: bool, origin: str
+    ) -> Self:
         """Create a new session file and open it for writing.
 
         Parameters
         ----------
         path
             Path of the file, which must not exist.
-        protocol_text, protocol_source
+        text, source
             The protocol file word for word, and its name.
         simulated
             Whether the data come from a simulation; permanent, and marked on every result.
@@ -86,17 +79,17 @@ class Session(Reader, AbstractContextManager["Session"]):
             "created": _now(),
             "rig_version": __version__,
             "python_version": platform.python_version(),
-            "protocol_sha256": hashlib.sha256(protocol_text.encode()).hexdigest(),
+            "protocol_sha256": hashlib.sha256(text.encode()).hexdigest(),
             "simulated": "true" if simulated else "false",
             "origin": encodable(origin),
         }
         place = Path(os.path.realpath(path))
-        protocol = encodable(protocol_source), protocol_text
-        rows: Record = {"meta": [*meta.items()], "protocol": [(1, *protocol)]}
+        protocol = 1, encodable(source), text
+        rows: Record = {"meta": [*meta.items()], "protocol": [protocol]}
         return cls._connect(place, WriterLock(place), rows)
 
     @classmethod
-    def open(cls, path: str | os.PathLike[str], readonly: bool = False) -> Session:
+    def open(cls, path: str | os.PathLike[str], readonly: bool = False) -> Self:
         """Open an existing session.
 
         Parameters
@@ -152,10 +145,8 @@ class Session(Reader, AbstractContextManager["Session"]):
         """
         try:
             self._writable().commit()
-        except SessionError:
+        finally:
             self.require_presence()
-            raise
-        self.require_presence()
 
     def require_presence(self) -> None:
         """Check that the file is still at its path; otherwise save all records elsewhere.

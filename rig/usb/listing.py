@@ -1,16 +1,13 @@
 """The serial ports of this computer, and why each may or may not be a board's. Opens none."""
 
-from __future__ import annotations
-
 import os
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
 from rig.boards import MEGA, PICO, UNO
 from rig.reasons import rig_error
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
-
     from serial.tools.list_ports_common import ListPortInfo
 
 
@@ -92,18 +89,17 @@ def serial_ports() -> list[SerialPort]:
     return sorted(ports, key=lambda port: (not port.candidate, port.path))
 
 
-def _describe(info: ListPortInfo) -> SerialPort:
+def _describe(info: "ListPortInfo") -> SerialPort:
     """Say what a port is and whether it may be a board's."""
     numbers = f"{info.vid or 0:04x}:{info.pid or 0:04x}"
     kinds = [kind for kind in KNOWN if numbers in kind.numbers]
     boards = tuple(kind.product for kind in kinds if kind.product is not None)
+    is_foreign = not (info.product or "").startswith(boards)
     reasons = {
         "no USB device": None in {info.vid, info.pid},
         "no board's USB numbers: name it with --port if it is one": not kinds,
         "a chip that boards and other instruments have: name it with --port": not boards,
-        "a board with another program: name it with --port if it is one of this rig": (
-            not (info.product or "").startswith(boards)
-        ),
+        "a board with another program: name it with --port if it is one of this rig": is_foreign,
     }
     skipped = next((reason for reason, applies in reasons.items() if applies), "")
     texts = info.serial_number, info.manufacturer, info.product
@@ -136,8 +132,7 @@ def path_of(serial_number: str, ports: Iterable[SerialPort]) -> str | None:
     """
     paths = [port.path for port in ports if port.serial_number == serial_number]
     if len(paths) > 1:
-        places = " and ".join(paths)
-        raise rig_error("many_serial_numbers", ports=places, number=serial_number)
+        raise rig_error("many_serial_numbers", ports=" and ".join(paths), number=serial_number)
     return paths[0] if paths else None
 
 

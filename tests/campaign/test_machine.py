@@ -1,7 +1,5 @@
 """A plan on its way: whatever happens in whatever order, nothing falls that should not."""
 
-from dataclasses import replace
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -220,7 +218,7 @@ def test_neither_the_plans_end_nor_another_attempt_passes_over_it(onward):
 
 
 def test_a_drop_that_fell_has_no_refusals_left():
-    flow = replace(Flow(stage=Stage.FIRING, attended=False), job=JOB, refusals=LOOKS - 1)
+    flow = Flow(Stage.FIRING, job=JOB, attended=False, refusals=LOOKS - 1)
     flow, effects = through(flow, DONE)
     assert (flow.refusals, effects) == (0, [on.Collect(JOB)])
 

@@ -46,7 +46,7 @@ class Clocks:
     """Clocks of a host that are moved by hand."""
 
     def __init__(self, boottime=True):
-        self.now = HostClocks(5 * S, 7 * S if boottime else None, 10**18)
+        self.now = HostClocks(5 * S, 7 * S if boottime else 5 * S, 10**18)
 
     def __call__(self):
         return self.now
@@ -54,11 +54,9 @@ class Clocks:
     def go(self, awake=0.0, slept=0.0, stepped=0.0):
         mono, boot, wall = self.now
         both = round((awake + slept) * S)
-        self.now = HostClocks(
-            mono + round(awake * S),
-            None if boot is None else boot + both,
-            wall + both + round(stepped * S),
-        )
+        later = mono + round(awake * S)
+        boot = later if boot == mono else boot + both
+        self.now = HostClocks(later, boot, wall + both + round(stepped * S))
 
 
 def test_sleep_and_a_set_clock_are_told_apart():

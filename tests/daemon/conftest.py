@@ -39,7 +39,7 @@ def driver(processes, client):
     """Have a session open and control of it."""
     one = client("the driver")
     one.take_control()
-    one.open_session(str(processes.protocol), str(processes.session))
+    one.open_session(processes.protocol, processes.session)
     return one
 
 

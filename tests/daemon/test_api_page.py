@@ -23,8 +23,8 @@ def test_every_method_is_on_the_page():
 def test_every_kind_of_error_is_on_the_page():
     kinds = re.search(r"^\| `kind` \| (.*) \|$", PAGE, re.MULTILINE).group(1)
     for kind in re.findall(r"`(\w+)`", kinds):
-        data = {"kind": kind, "message": "m", "reason": "BUSY", "detail": 0}
-        assert type(rpc.error_from_data(data)).__name__ == kind
+        error = {"data": {"kind": kind, "reason": "BUSY", "detail": 0}}
+        assert type(rpc.error_of(error)).__name__ == kind
 
 
 def test_the_page_has_the_numbers():

@@ -20,7 +20,7 @@ def test_a_session_and_a_pulled_cable_are_told_once_each():
         told = [processes.daemon.stderr.readline().rstrip()]
         client = processes.client("the driver")
         client.take_control()
-        client.open_session(str(processes.protocol), str(processes.session))
+        client.open_session(processes.protocol, processes.session)
         client.fire(client.arm(1, 1))
         client.collect(1, 1)
         client.arm(2, 1)

@@ -32,7 +32,7 @@ from rig.recorder.feed import StateFeed
 from rig.recorder.interrupts import Interrupts
 from rig.recorder.published import EDGES_LIMIT, PublishedState
 from rig.recorder.recorder import NullSink
-from rig.records import Drop, Edge
+from rig.records import Drop, Edge, Job
 from rig.session.schema import RunState
 from tests.refusals import refused
 from tests.tables import cases, read_table
@@ -49,7 +49,7 @@ ERRORS = [
 @pytest.mark.parametrize("error", ERRORS, ids=lambda error: type(error).__name__)
 def test_an_error_comes_out_as_it_went_in(error):
     line = rpc.failure(7, error)
-    again = rpc.error_of(json.loads(line))
+    again = rpc.error_of(json.loads(line)["error"])
     assert type(again) is type(error)
     assert str(again) == str(error)
     for name in ("exit_code", "reason", "detail", "disarmed", "reasons"):
@@ -61,16 +61,16 @@ def test_a_refusal_has_its_code_and_values_as_results_have_them():
     (reason,) = data["reason_codes"]
     assert (reason["code"], reason["values"]) == ("refused_gate_blocked", {"channels": [1, 3]})
     assert data["message"] == "gates 1, 3 are blocked"
-    assert rpc.error_to_data(errors.InputError("no"))["reason_codes"] == []
+    assert not rpc.error_to_data(errors.InputError("no"))["reason_codes"]
 
 
 def test_an_error_of_a_kind_nobody_listed_becomes_the_one_above_it():
-    again = rpc.error_from_data(rpc.error_to_data(errors.DomainError("Eq. 13 is singular")))
+    again = rpc.error_of({"data": rpc.error_to_data(errors.DomainError("singular"))})
     assert type(again) is errors.InputError
 
 
 def test_an_error_of_a_kind_only_the_daemon_knows_is_an_error_all_the_same():
-    again = rpc.error_from_data({"kind": "NewerError", "message": "m", "hint": "h", "exit_code": 3})
+    again = rpc.error_of({"data": {"kind": "New", "message": "m", "hint": "h", "exit_code": 3}})
     assert (type(again), str(again), again.exit_code) == (errors.RigError, "m\n  hint: h", 3)
 
 
@@ -234,7 +234,7 @@ def test_what_falls_is_shown_while_it_falls_and_frames_out_of_order_are_not():
     published = PublishedState()
     published.plan([{"run": 1}])
     feed, label = StateFeed(published), wire.pack_label(1, 1)
-    feed.state(1, 1, RunState.ARMED, ())
+    feed.state(Job(1, 1), RunState.ARMED, ())
     frames = [(0, (110, 1)), (3, (140, 1), (150, 3)), (1, (120, 0))]
     events = [wire.EventsFrame(label, at, wire.pack_events(of)) for at, *of in frames]
     for message in (events[0], wire.Fired(100), *events):
@@ -246,11 +246,11 @@ def test_what_falls_is_shown_while_it_falls_and_frames_out_of_order_are_not():
     feed.show_drop(Drop(1, 1, 1000, (Edge(10, 0, True), Edge(20, 0, False)), 100))
     assert published.get("phase") == "idle"
     assert published.snapshot()["state"]["edges"] == [(10, 0, 1), (20, 0, 0)]
-    feed.state(1, 2, RunState.ARMED, ())
+    feed.state(Job(1, 2), RunState.ARMED, ())
     assert published.snapshot()["state"]["edges"] == []
     feed.know(Incoming(0, 0, wire.Disarmed(1, DisarmReason.TIMEOUT)))
     assert published.get("phase") == "idle"
-    feed.state(1, 2, RunState.INTERRUPTED, ())
+    feed.state(Job(1, 2), RunState.INTERRUPTED, ())
     state = published.snapshot()["state"]
     assert state["drop"]["state"] == state["runs"][0]["state"] == "interrupted"
 
@@ -281,7 +281,7 @@ def test_a_session_is_shown_until_it_is_closed_and_blind_until_it_is_not(tmp_pat
     protocol = tmp_path / "fence.yaml"
     protocol.write_text(FENCE.replace("RUNS", "1") + "blind: true\n", "utf-8")
     rig = Controller("sim://", PublishedState())
-    rig.open_session(str(protocol), str(tmp_path / "session"))
+    rig.open_session(protocol, tmp_path / "session")
     about = rig.published.get("session")
     assert (about["path"], about["blind"]) == (str(tmp_path / "session"), True)
     rig.unblind()

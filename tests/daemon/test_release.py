@@ -28,8 +28,7 @@ def test_it_is_driven_for_the_protocols_pulse_and_is_no_run(processes, driver):
     on, off = driven(processes)
     assert off[0] - on[1] < 0.08 < off[1] - on[0]
     assert driver.call("subscribe")["state"]["phase"] == "idle"
-    token = driver.arm(1, 1)
-    driver.fire(token)
+    driver.fire(driver.arm(1, 1))
     driver.collect(1, 1)
     driver.close_session()
     assert section(driver) == found

@@ -78,11 +78,11 @@ def test_the_same_command_finds_it_too_when_nothing_is_where_it_was(usb):
         elsewhere = processes.folder / "elsewhere"
         usb |= {processes.port: "85430", elsewhere: "85430"}
         with closing(Controller(str(processes.port), PublishedState())) as controller:
-            controller.open_session(str(processes.protocol), str(processes.session))
+            controller.open_session(processes.protocol, processes.session)
         processes.hand(f"pull 0 {elsewhere}")
         until(elsewhere.exists)
         with closing(Controller(str(processes.port), PublishedState())) as controller:
-            controller.open_session(str(processes.protocol), str(processes.session))
+            controller.open_session(processes.protocol, processes.session)
             assert controller.published.get("port")["path"] == os.path.realpath(elsewhere)
         usb[elsewhere] = "999"
         with closing(Controller(str(processes.port), PublishedState())) as controller:

@@ -92,7 +92,7 @@ async def test_another_user_is_not_served(door, monkeypatch):
 async def test_a_client_of_another_version_is_told_so_and_sent_away(door):
     skewed = rpc.request("hello", {"api": rpc.API + 1, "client": "t"}, 1)
     answer, end = await told(door.path, skewed, HELLO)
-    error = rpc.error_of(answer)
+    error = rpc.error_of(answer["error"])
     assert isinstance(error, VersionError)
     assert "version 2 of the daemon's interface" in str(error)
     assert end is None
@@ -316,14 +316,14 @@ async def test_a_stop_is_read_behind_any_number_of_requests(door, monkeypatch):
     control = rpc.request("take_control", {}, 2)
     waits = [rpc.request("wait", {"seconds": 3600}, number) for number in range(3, 300)]
     (client,) = door.server.service.connections
-    do = client._do
+    do = client.do
 
     async def held(one, request):
         if request.method == "wait":
             await asyncio.Event().wait()
         return await do(one, request)
 
-    monkeypatch.setattr(client, "_do", held)
+    monkeypatch.setattr(client, "do", held)
     writer.write(control + b"".join(waits) + rpc.request("stop", {}, 1000))
     told = {}
     while not {299, 1000} <= told.keys():  # the stop may overtake
@@ -346,7 +346,7 @@ async def test_a_stop_waits_for_no_more_than_what_is_being_answered(door, monkey
         return do(client, request)
 
     for one in door.server.service.connections:
-        monkeypatch.setattr(one, "_do", noted)
+        monkeypatch.setattr(one, "do", noted)
     for _, writer in many:
         writer.write(b"".join(rpc.request("subscribe", {}, number) for number in range(20)))
     while "stop" not in done:

@@ -242,6 +242,11 @@ def test_a_stop_ends_a_test_of_the_release(box, monkeypatch, deeds):
     assert isinstance(box.arm(), int), "nothing is left behind that forbids it"
 
 
+def test_a_test_of_the_release_that_is_not_whole_is_shown(box):
+    box.board.lab.drop = lambda _: box.board.stop(True) or []
+    assert "stop" in box.asked(lambda c: c.test_release())["faults"][0]
+
+
 def test_what_was_heard_of_a_port_that_is_gone_is_on_the_disk(box):
     box.pull()
     box.asked(lambda c: c.recorder.look())

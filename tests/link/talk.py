@@ -28,8 +28,7 @@ def record_drop(device: Device, label: int = LABEL, **changes: int) -> Drop:
 
 def release_drop(device: Device, drop: Drop) -> None:
     """Let the device forget a drop."""
-    label = wire.pack_label(drop.run, drop.attempt)
-    device.acknowledge(label, drop.certificate.crc32)
+    device.acknowledge(wire.pack_label(*drop.job), drop.certificate.crc32)
 
 
 def order(**changes: int) -> wire.Arm:

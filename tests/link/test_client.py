@@ -100,8 +100,7 @@ class Captive(FakePort):
 
 
 def test_a_boot_loader_is_left_in_peace_until_it_lets_go(clock):
-    port = Captive(clock, {})
-    assert Device(port, clock).connect() == IDENTITY
+    assert Device(Captive(clock, {}), clock).connect() == IDENTITY
 
 
 @pytest.mark.parametrize(("tries", "asked"), [(40, 4), (4, 4), (2, 2)])

@@ -1,7 +1,5 @@
 """STOP everywhere: in every dialog, while typing, and in every state that lasts."""
 
-from dataclasses import replace
-
 from textual.widgets import Input
 
 from rig.campaign.machine import Stage
@@ -58,7 +56,7 @@ async def test_stop_works_in_every_state_that_lasts(lab):
     async with lab.ready(countdown_s=600.0) as op:
         await op.play("stop in every state that lasts")
         await op.until(lambda: op.app.follower.state.phase == "idle")
-        op.app.driver.flow = replace(op.app.flow, countdown_s=0.1)
+        op.app.driver.flow = op.app.flow._replace(countdown_s=0.1)
         await op.arm(Stage.LIVE)
         await op.stop("escape")
         await op.at(Stage.RESULT)  # what there is is kept and judged

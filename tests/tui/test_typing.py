@@ -180,7 +180,7 @@ async def _typed(session, lived):
                 break
             while len(app.screen_stack) > 1:
                 app.screen.dismiss(None)
-            app.driver.flow = replace(MOMENTS[moment], ticket=app.flow.ticket + 1)
+            app.driver.flow = MOMENTS[moment]._replace(ticket=app.flow.ticket + 1)
             await pilot.pause(0.12)  # its page is there, unless another one was turned to
             if dialog:
                 await hands.key(dialog)
@@ -202,7 +202,7 @@ async def test_a_key_that_comes_back_from_its_field_after_the_end_is_dropped(ses
 async def test_stop_is_on_its_way_within_a_tenth_of_a_second(session):
     async with _screen(session) as (app, pilot):
         for moment, flow in MOMENTS.items():
-            app.driver.flow = replace(flow, ticket=app.flow.ticket + 1)
+            app.driver.flow = flow._replace(ticket=app.flow.ticket + 1)
             end = time.monotonic() + PATIENCE_S
             while app._open() and app.page != PAGE_OF.get(moment, "run"):
                 assert time.monotonic() < end, app.page

@@ -66,7 +66,7 @@ def test_a_void_drop_says_what_to_do():
 def test_enter_is_not_offered_before_the_verdict_is_kept():
     """It would do nothing: what comes next depends on the verdict."""
     shown = replace(model("x"), driving=True)
-    waits, kept = (replace(shown.flow, logged=logged) for logged in (False, True))
+    waits, kept = (shown.flow._replace(logged=logged) for logged in (False, True))
     job = Job(2, 1)
     assert step(waits, GoOn(job, 0.0)) == (waits, ())
     assert "Enter after the verdict is saved" in keys_of(replace(shown, flow=waits))
