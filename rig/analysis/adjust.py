@@ -1,7 +1,5 @@
 """Robust non-linear least squares with priors, and the covariance of the estimates."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

@@ -5,8 +5,6 @@ averaging does not reduce it. For runs of a joint fit the common part has a sign
 `Measured.shared`, and may cancel (GUM 5.2.2). For other runs only the budget lines are known.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Lines of the uncertainty budget, from ``budget_lines.txt``, and effective degrees of freedom."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import NamedTuple

@@ -12,8 +12,6 @@ result less prediction is therefore g·g − g·w for unknowns with priors. For 
 as α, the prediction has the true value: they add nothing to g·g, but 2 e·w with e their part of g.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache

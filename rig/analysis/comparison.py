@@ -5,8 +5,6 @@ measurement, the model's coefficients, and the scatter of single falls about the
 the mean of n falls is divided by √n.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Predictions against inclination, for figures."""
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import Any

@@ -4,8 +4,6 @@ A gate that disagrees is reported, never fitted away. `rig.analysis.explanations
 possible causes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable, Iterator
 from itertools import product
 from typing import Any, NamedTuple

@@ -4,8 +4,6 @@ scipy is imported on the first call: the import takes longer than the analysis o
 predictions, checks and plans do not need it.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import Any
 

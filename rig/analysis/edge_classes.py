@@ -5,8 +5,6 @@ shadow merged with the next. An observed edge without a rod is part of a flicker
 a rebounding rod, a later passage of the object, or unexplained.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

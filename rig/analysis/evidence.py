@@ -10,8 +10,6 @@ influence. If several components add up to a variance, each is multiplied by the
 it explains (also an EM step), which keeps all positive. No component falls below a share of S.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 

@@ -9,8 +9,6 @@ prior probability and a range of sizes. The rivals of a fault are all others, an
 departs from the equations. Only a fault with clear odds against all rivals is named.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Fit of a single drop: matching and least squares in turn."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

@@ -4,8 +4,6 @@ The formulas are those of `rig.model.drag`, extended to κ < 0, which a trial st
 reach. κ may differ from leg to leg but not in sign, and is never 0: see `some_air`.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rig.arrays import Array

@@ -1,7 +1,5 @@
 """DueEdges of a single object through the gates: speed, and interval since the previous gate."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

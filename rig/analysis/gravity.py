@@ -6,8 +6,6 @@ wrong. Only the free chain's edges are used, like those of a calibration drop. D
 unknown: without it, a light chain would give a g several per cent too low.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ unknowns of the rig and compared by marginal likelihood (Laplace's method). The 
 identification are those of the best reading against the best different reading.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence

@@ -5,8 +5,6 @@ differs from the protocol. So the reason mentions both, and the drop stays good:
 valid.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from contextlib import suppress

@@ -6,8 +6,6 @@ complement), so the cost grows linearly with the number of drops. The variance c
 nuisance parameters are estimated on the way (`rig.analysis.evidence`).
 """
 
-from __future__ import annotations
-
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence

@@ -5,8 +5,6 @@ the free chain are solved without all other edges. α and the release times have
 here they only stand for time and speed at the end of the fall.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 

@@ -3,8 +3,6 @@
 Where two protocols state the same of an owner, its unknowns may be the same.
 """
 
-from __future__ import annotations
-
 from rig.protocol.protocol import Protocol, Run
 
 

@@ -5,8 +5,6 @@ chains share. Half of the release skew's difference is an effect of the chains; 
 remains when they change places is an effect of the sides.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Ordered execution of many tasks, in this process or, for long work, in several."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

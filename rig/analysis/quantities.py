@@ -1,7 +1,5 @@
 """The measurands as functions of the fitted unknowns."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial

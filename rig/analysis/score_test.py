@@ -4,8 +4,6 @@ It uses the slope and curvature of the log likelihood at the best estimate, alon
 the unknowns without a prior.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

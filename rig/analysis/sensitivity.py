@@ -4,8 +4,6 @@ The session is fitted again with each change, from its present solution. A linea
 do: a stated scatter has little weight if the drops determine it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import fields, replace
 from typing import Any

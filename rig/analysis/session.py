@@ -1,7 +1,5 @@
 """Analysis of sessions: each drop by itself, then the joint fit and the summary."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace

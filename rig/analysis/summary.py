@@ -1,7 +1,5 @@
 """Summary of a session: means for each incline and striking chain, with the model's values."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace

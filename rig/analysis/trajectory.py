@@ -6,8 +6,6 @@ in `rig.model.fall` and `rig.model.drag`. Parameters are release time, start hei
 falls of the same chain.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Verdict on a drop, by limits that are fixed before any result is seen."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 

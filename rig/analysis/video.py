@@ -1,7 +1,5 @@
 """Acceleration from a video of the same fall, for comparison with the gates."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

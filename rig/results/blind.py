@@ -6,8 +6,6 @@ measured values, means, fits and everything derived from them are withheld. This
 all code that shows results.
 """
 
-from __future__ import annotations
-
 from rig.analysis.last_passages import CODES
 from rig.analysis.result import DropResult
 from rig.analysis.session import Analysis

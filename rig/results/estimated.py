@@ -1,7 +1,5 @@
 """Impact parameters for `rig estimate` and reports, from the cache or estimated anew."""
 
-from __future__ import annotations
-
 from rig.analysis.session import Progress
 from rig.cache.entry import recall
 from rig.estimate.session import SessionEstimate, estimate

@@ -1,7 +1,5 @@
 """Advice what to measure better: the inputs with the largest share of a mean's uncertainty."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Cache of the drops' own summaries, shared by all processes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from hashlib import sha256
 from itertools import chain

@@ -3,8 +3,6 @@
 The verdict on a new drop comes from here, with or without a screen.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -3,8 +3,6 @@
 Each session counts once; it must be finished, undamaged, unblinded and of the same kind of scene.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Complete results of a session, as `rig analyze` prints them."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace

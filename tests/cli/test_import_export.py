@@ -63,9 +63,10 @@ def test_exported_edges_give_the_same_results_again(bring, call, analysis, tmp_p
                 for line in one["budget"]
                 if (line["name"], line["quantity"]) == ("clock", name)
             )
-            # A clock that is known otherwise weighs the edges otherwise, too, by parts in 100 000.
+            # A clock that is known otherwise weighs the edges otherwise, and so a joint fit ends
+            # elsewhere within its last step, which is a fiftieth of u.
             far = abs(one[name]["value"] - two[name]["value"])
-            assert far <= 2.0 * clock + 1e-4 * one[name]["u"], name
+            assert far <= 2.0 * clock + 1e-3 * one[name]["u"], name
     for one, two in zip(analysis["summary"], again["summary"], strict=True):
         assert one["separation_m"]["value"] == pytest.approx(two["separation_m"]["value"], abs=1e-6)
         assert one["speed_m_s"]["value"] == pytest.approx(two["speed_m_s"]["value"], abs=1e-4)
