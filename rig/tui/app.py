@@ -10,7 +10,7 @@ from typing import Any
 
 from textual import events
 from textual.app import App, ComposeResult
-from textual.css.query import NoMatches
+from textual.content import Content
 from textual.filter import LineFilter
 from textual.theme import Theme
 from textual.widgets import Input
@@ -30,9 +30,10 @@ from rig.tui.follow import Follower
 from rig.tui.model import Model
 from rig.tui.stillness import Stillness
 from rig.tui.terminal import Terminal
-from rig.tui.widgets.bars import StatusBar, StopBar, StopLine
-from rig.tui.widgets.dialogs import Ask, Confirm, Dialog
+from rig.tui.widgets.bars import StopLine, headline, hints, problem, tabs
+from rig.tui.widgets.dialogs import Ask, Confirm, Dialog, TextDialog
 from rig.tui.widgets.page import Page
+from rig.tui.widgets.text import Words, plain
 
 TICK_S = 0.1
 _LEAST_S = 0.01  # least time between ticks, after a late tick
@@ -125,9 +126,10 @@ class RigApp(App[None], inherit_bindings=False):
     # ------------------------------------------------------------------ life
 
     def compose(self) -> ComposeResult:
-        yield StatusBar()
+        yield from (Words(id=name) for name in ("headline", "tabs", "problem", "told"))
         yield Page()
-        yield StopBar()
+        yield Words(id="hints")
+        yield StopLine()
 
     async def on_mount(self) -> None:
         if not self.options.offline:
@@ -188,16 +190,19 @@ class RigApp(App[None], inherit_bindings=False):
 
     def draw(self) -> None:
         """Draw all changes since the last drawing."""
-        if not self._open():
-            return
-        model, size, base = self.model, self.size, self.screen_stack[0]
-        try:
-            base.query_one("#alarm")
-        except NoMatches:
+        if not self._open() or not self.screen_stack[0].query(StopLine):
             return  # the screen is opening or closing
-        message = self._told if model.now_s - self._told_s < _TOLD_S else ""
-        base.query_one(StatusBar).show(model, self.keys, size.width, message)
-        base.query_one(StopBar).show(model, self.keys, size.width, self.possible)
+        model, width = self.model, self.size.width - 2
+        wrong, is_told = problem(model), model.now_s - self._told_s < _TOLD_S
+        lines: dict[str, Content | str] = {
+            "headline": headline(model, width),
+            "tabs": tabs(self.page, self.keys),
+            "problem": wrong,
+            "told": plain(self._told, 240) if is_told and not wrong else "",
+            "hints": hints(model, self.keys, width, self.possible),
+        }
+        for name, text in lines.items():
+            self.screen_stack[0].query_one(f"#{name}", Words).say(text)
         for screen in self.screen_stack:
             for line in screen.query(StopLine):
                 line.show(model, self.keys)
@@ -212,7 +217,7 @@ class RigApp(App[None], inherit_bindings=False):
     def _face(self) -> Hashable:
         """Return the part of the view on which the meaning of a key depends."""
         flow = self.flow
-        return self.page, flow.stage, flow.job, self.driving, id(self.screen)
+        return self.page, flow.stage, flow.job, self.client.driving, id(self.screen)
 
     # ------------------------------------------------------------------ what is known
 
@@ -220,11 +225,6 @@ class RigApp(App[None], inherit_bindings=False):
     def flow(self) -> Flow:
         """State of the campaign."""
         return self.driver.flow
-
-    @property
-    def driving(self) -> bool:
-        """Whether this screen has control of the rig."""
-        return self.client.driving
 
     @property
     def model(self) -> Model:
@@ -239,7 +239,7 @@ class RigApp(App[None], inherit_bindings=False):
             view=follower.view,
             voids=follower.voids,
             connected=offline or client.up,
-            driving=self.driving,
+            driving=client.driving,
             now_s=monotonic(),
             silence=client.silence,
             port=client.port,
@@ -382,19 +382,14 @@ class RigApp(App[None], inherit_bindings=False):
 
     def _answers(self, dialog: Dialog, key: str, at_s: float) -> bool:
         """Let a key answer a dialog; return whether it did."""
-        by = {"up": -1, "down": 1}.get(key, 0)
-        if by and not isinstance(dialog, Confirm):
-            if dialog.is_mounted:
-                dialog.move(by)
-        elif key == "enter" and isinstance(dialog, Confirm):
-            if self._stillness.meant(self._face, at_s):
-                dialog.dismiss(True)
-        elif key == "enter" and isinstance(dialog, Ask):
-            return not self._stillness.read(self._face, at_s)  # pasted with what opened it
-        elif dialog.LEAVE in {"", key}:
-            dialog.dismiss(None)
-        else:
+        if isinstance(dialog, Ask):  # its field takes all but an Enter pasted with what opened it
+            return key == "enter" and not self._stillness.read(self._face, at_s)
+        if isinstance(dialog, TextDialog) and key in {"up", "down"}:
             return False
+        if not isinstance(dialog, Confirm) or key != "enter":
+            dialog.dismiss(None)
+        elif self._stillness.meant(self._face, at_s):
+            dialog.dismiss(True)
         return True
 
     def _arm(self, at_s: float) -> None:
@@ -402,7 +397,7 @@ class RigApp(App[None], inherit_bindings=False):
 
         Requires an Enter by itself: the run page was still, and no other key was pressed.
         """
-        if not self.driving:
+        if not self.client.driving:
             self.action_do("go_on")  # which shows the reason
         elif self._stillness.meant(self._face, at_s):
             model = self.model
@@ -415,7 +410,7 @@ class RigApp(App[None], inherit_bindings=False):
         action = BY_NAME[name]
         if self.possible(action):
             commands.do(self, name)
-        elif action.driving and not self.driving and not self.options.offline:
+        elif action.driving and not self.client.driving and not self.options.offline:
             self.driver.take(campaign.EffectFailure(self.flow.ticket, _WATCHING))
 
     def possible(self, action: Action) -> bool:
@@ -424,7 +419,7 @@ class RigApp(App[None], inherit_bindings=False):
             return False
         # Without a rig, an operator may start with a new one.
         begins = action.name == "go_on" and self.flow.stage is Stage.PROTOCOL
-        return possible(action, self.flow.stage, driving=self.driving or begins)
+        return possible(action, self.flow.stage, driving=self.client.driving or begins)
 
     def action_choose(self, at: int) -> None:
         """Select a row of the home page."""

@@ -96,20 +96,19 @@ class ReconnectingClient:
     @property
     def state(self) -> DaemonState:
         """Latest state of the daemon."""
-        return read_state(self._client.replica.state if self._client else {})
+        return read_state(self._sections)
+
+    @property
+    def _sections(self) -> Mapping[str, Any]:
+        return self._client.replica.state if self._client else {}
 
     @property
     def driving(self) -> bool:
         """Whether this client has control."""
-        if not self.up or self._client is None:
-            return False
-        control = self._client.replica.state.get("control")
-        if control is None:
-            # On a busy machine control may lapse; unless another client takes it, our next call
-            # restores it.
-            return self._had_control
-        mine: bool = control["client"] == self.name
-        return mine
+        control = self._sections.get("control")
+        # On a busy machine control may lapse; unless another client takes it, our next call
+        # restores it.
+        return self.up and (control["client"] == self.name if control else self._had_control)
 
     @property
     def connection(self) -> AsyncClient:
@@ -192,11 +191,14 @@ class ReconnectingClient:
             return
         reached = None
         try:
-            self._check(client.line.daemon)
+            self._port = str(client.line.daemon["port"])
+            if self.url and self._port != self.url:
+                self.in_the_way = self._port, int(client.line.daemon["pid"])
+                raise rig_error("daemon_port", port=self._port, wanted=self.url)
             client.changed = partial(self._note, client.replica)
             await client.call("subscribe")
             self._client, self.silence = client, ""
-            if self._wants_control and client.replica.state.get("control") is None:
+            if self._wants_control and self._sections.get("control") is None:
                 with suppress(RigError):
                     await self.take_control()
             # In parallel with heartbeats: opening a session may take longer than control lasts.
@@ -235,13 +237,6 @@ class ReconnectingClient:
             self.disk_s = float(answer.result()["disk_s"])
             with suppress(TimeoutError):
                 await asyncio.wait_for(client.lost.wait(), _BEAT_S)
-
-    def _check(self, daemon: Mapping[str, Any]) -> None:
-        """Check that the daemon has the requested port."""
-        self._port = str(daemon["port"])
-        if self.url and self._port != self.url:
-            self.in_the_way = self._port, int(daemon["pid"])
-            raise rig_error("daemon_port", port=self._port, wanted=self.url)
 
     def _start(self, error: DeviceError) -> None:
         """Start a daemon that outlives this screen until it is idle."""

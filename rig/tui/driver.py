@@ -1,6 +1,7 @@
 """Asynchronous driver of a campaign, which carries out effects in the background."""
 
 from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
 from time import monotonic
 from typing import Any
 
@@ -12,13 +13,14 @@ from rig.tui.follow import Follower
 from rig.tui.model import StopAnswer
 
 
+@dataclass
 class Driver:
     """Handles events of a campaign in order.
 
     Parameters
     ----------
     flow
-        Initial state of the campaign.
+        State of the campaign.
     client
         Client that carries out effects; `None` without a daemon.
     follower
@@ -26,41 +28,30 @@ class Driver:
     begin
         Runs a coroutine in the background.
 
-    Attributes
-    ----------
-    flow
-        State of the campaign.
     stop
         Answer to the latest STOP; `None` before the first.
     asked
         Protocol and session that were opened from here; `None` after they were closed.
     """
 
-    def __init__(
-        self,
-        flow: Flow,
-        client: ReconnectingClient,
-        follower: Follower,
-        begin: Callable[[Coroutine[Any, Any, None]], object],
-    ) -> None:
-        self.flow = flow
-        self.stop: StopAnswer | None = None
-        self.asked: tuple[str, str] | None = None
-        self._client = client
-        self._follower = follower
-        self._begin = begin
+    flow: Flow
+    client: ReconnectingClient
+    follower: Follower
+    begin: Callable[[Coroutine[Any, Any, None]], object]
+    stop: StopAnswer | None = None
+    asked: tuple[str, str] | None = None
 
     def take(self, event: Event) -> None:
         """Handle an event, and carry out its effects."""
         self.flow, effects = step(self.flow, event)
         if self.flow.stage is Stage.RESULT and self.flow.job is not None:
-            self._follower.judged.add(self.flow.job)
+            self.follower.judged.add(self.flow.job)
         for effect in effects:
-            if isinstance(effect, campaign.Stop) and self._client.idle:
+            if isinstance(effect, campaign.Stop) and self.client.idle:
                 continue  # without a rig, no chain can fall
             if isinstance(effect, campaign.Stop):
                 self.stop = StopAnswer(monotonic())
-            self._begin(self._carry_out(effect, self.flow.ticket))
+            self.begin(self._carry_out(effect, self.flow.ticket))
 
     def refuse(self, error: RigError) -> None:
         """Show an error with its remedy."""
@@ -69,18 +60,18 @@ class Driver:
     async def open_session(self, protocol: str, session: str, seed: int | None) -> None:
         """Open a session in the daemon, now and after each restart."""
         names = {"protocol": protocol, "session": session, "seed": seed}
-        await self._client.connection.call("open_session", **names)
+        await self.client.connection.call("open_session", **names)
         self.asked = protocol, session
 
     async def _carry_out(self, effect: Effect, ticket: int) -> None:
         """Carry out an effect, and handle the resulting event."""
-        client, token = self._client, None
+        client, token = self.client, None
         try:
             match effect:
                 case campaign.GiveUp():
                     return  # the error is shown, and the operator decides
                 case campaign.Stop(reason):
-                    await self._switch_off(client, reason)
+                    await self._switch_off(reason)
                     return
                 case campaign.Wait(seconds):
                     await client.connection.call("wait", seconds=seconds)
@@ -97,8 +88,8 @@ class Driver:
                     verdict = {"state": state, "reasons": [reason.record() for reason in reasons]}
                     await client.connection.call("log_state", **job._asdict(), **verdict)
                 case campaign.Judge(job):
-                    result = (await self._follower.read()).results[job]
-                    row = self._follower.voids.row
+                    result = (await self.follower.read()).results[job]
+                    row = self.follower.voids.row
                     self.take(campaign.DropVerdict(ticket, result.verdict, result.reasons, row))
                     return
         except RigError as error:
@@ -106,7 +97,7 @@ class Driver:
         else:
             self.take(campaign.EffectDone(ticket, token))
 
-    async def _switch_off(self, client: ReconnectingClient, reason: str) -> None:
+    async def _switch_off(self, reason: str) -> None:
         """Switch all outputs off, and repeat until the result is known.
 
         The daemon answers within a second, even without an answer of the board.
@@ -114,7 +105,7 @@ class Driver:
         asked, is_known = self.stop, False
         while not is_known and asked is self.stop:
             try:
-                await client.connection.call("stop", reason=reason)
+                await self.client.connection.call("stop", reason=reason)
             except RigError as error:
                 heard, is_known = False, not isinstance(error, DeviceTimeoutError)
             else:

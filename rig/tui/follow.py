@@ -140,11 +140,10 @@ class Follower:
         drop = state.section("drop")
         job = Job(drop["run"], drop["attempt"]) if drop else None
         last, counted = self._counted
-        if job != last:
-            counted = 0
-        if len(state.edges) > counted and drop.get("state") == "fired":
-            fresh = tuple(int(edge[1]) for edge in state.edges[counted:])
-            self.indicators = self.indicators.count_edges(fresh, now)
+        fresh = state.edges[counted if job == last else 0 :]
+        if fresh and drop.get("state") == "fired":
+            channels = tuple(int(edge[1]) for edge in fresh)
+            self.indicators = self.indicators.count_edges(channels, now)
         else:
             self.indicators = self.indicators.seen(state.blocked_mask, now)
         self._counted = job, len(state.edges)
@@ -182,16 +181,12 @@ class Follower:
         finally:
             self._reading, self._read = False, request
         if path == self._path:
-            self._take(view)
+            self.view, self.unreadable, self.voids = view, "", voids_of(view.states)
+            self._client.changed = True
         if view.lagging and not self._fitting:
             self._fitting = True
             self._begin(self._fit_jointly(live, view))
         return view
-
-    def _take(self, view: SessionView) -> None:
-        self.view, self.unreadable = view, ""
-        self.voids = voids_of(view.states)
-        self._client.changed = True
 
     async def _read_quietly(self) -> None:
         try:

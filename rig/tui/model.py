@@ -31,13 +31,6 @@ WATCHED = {"armed": Stage.COUNTDOWN, "fired": Stage.LIVE, "recorded": Stage.RESU
 """Stage of a watcher, by the state of the drop."""
 
 
-class Alarm(NamedTuple):
-    """A problem, and its remedy."""
-
-    message: str
-    hint: str = ""
-
-
 class StopAnswer(NamedTuple):
     """State of the latest STOP: time of sending (monotonic, s), and `heard` once known."""
 
@@ -107,7 +100,9 @@ class Model:
         if flow.stage is not Stage.RESULT or job is None:
             return self.state.runs
         return tuple(
-            line._replace(state=flow.verdict, attempt=job.attempt) if line.run == job.run else line
+            line._replace(attempt=job.attempt, state=flow.verdict, reasons=flow.reasons)
+            if line.run == job.run
+            else line
             for line in self.state.runs
         )
 
@@ -172,37 +167,30 @@ class Model:
     @property
     def run(self) -> Run | None:
         """The current planned run."""
-        if self.view is None or self.job is None:
-            return None
-        return self.view.plan.get(self.job.run)
+        return self.view.plan.get(self.job.run) if self.view and self.job else None
 
     @property
     def verdict(self) -> tuple[str, tuple[Reason, ...]]:
         """Verdict and reasons of the present attempt; empty before the verdict."""
-        if self.flow.stage is Stage.RESULT and self.flow.job == self.job:
-            return self.flow.verdict, self.flow.reasons
-        line = self.state.line(self.job.run) if self.job else None
-        if line is None or self.job is None or line.attempt != self.job.attempt:
-            return "", ()
-        return line.state, line.reasons
+        job = self.job
+        lines = (line for line in self.runs if (line.run, line.attempt) == job)
+        return next(((line.state, line.reasons) for line in lines), ("", ()))
 
     @property
     def previous(self) -> Job | None:
         """The latest good attempt that the present attempt replaces; `None` if there is none."""
-        if self.view is None or self.job is None:
-            return None
-        run, attempt = self.job
-        earlier = [
-            job
-            for job, result in self.view.results.items()
-            if job.run == run and job.attempt < attempt and result.verdict in GOOD
-        ]
-        return earlier[-1] if earlier else None
+        results = self.view.results if self.view else {}
+        good = {job for job, result in results.items() if result.verdict in GOOD}
+        present = self.job or Job(0, 0)
+        earlier = (job for job in good if job.run == present.run and job < present)
+        return max(earlier, default=None)
 
     @property
     def simulated(self) -> bool:
         """Whether the data are simulated, and must be marked."""
-        return self.state.simulated or bool(self.view and self.view.simulated)
+        sections = map(self.state.section, ("port", "session"))
+        is_rig = any(section.get("simulated") for section in sections)
+        return is_rig or bool(self.view and self.view.simulated)
 
     @property
     def blind(self) -> bool:
@@ -210,32 +198,27 @@ class Model:
         return bool(self.state.section("session").get("blind") or (self.view and self.view.blind))
 
 
-def alarm(model: Model) -> Alarm | None:
-    """Return the most serious present problem; `None` without problems."""
+def alarm(model: Model) -> str:
+    """Return the most serious present problem, and its remedy on a second line; or nothing."""
     if not model.connected and not model.idle:
         silence, _, hint = model.silence.partition("\n")
         begun = model.flow.stage is not Stage.PROTOCOL
         parts = [hint, "reconnecting", *[_ALONE] * begun]
-        message = f"no daemon: {silence or 'connecting'}"
-        return Alarm(message, "; ".join(filter(None, parts)))
+        return f"no daemon: {silence or 'connecting'}\n{'; '.join(filter(None, parts))}"
     if model.disk_s > SLOW_DISK_S:
-        return Alarm(
-            f"the disk has not finished a write for {model.disk_s:.1f} s",
+        return (
+            f"the disk has not finished a write for {model.disk_s:.1f} s\n"
             "nothing is lost, and an armed board has switched itself off; check whether the disk "
-            "is full, asleep or on a network, and whether another program uses the file",
+            "is full, asleep or on a network, and whether another program uses the file"
         )
     link, error = model.state.section("link"), model.state.section("error")
     if link.get("state") == "down" or (link.get("state") == "opening" and error):
         why, wait = link.get("error") or error, link.get("retry_s")
         again = f" in {float(wait):.0f} s" if wait is not None else ""
-        return Alarm(
-            f"the port is lost: {why.get('message', '')}",
-            f"reconnecting{again}; {why.get('hint') or 'check cable and power'}",
+        return (
+            f"the port is lost: {why.get('message', '')}\n"
+            f"reconnecting{again}; {why.get('hint') or 'check cable and power'}"
         )
     if error:
-        return Alarm(str(error.get("message", "")), str(error.get("hint", "")))
-    for trouble in (model.flow.trouble, model.unreadable):
-        if trouble:
-            message, _, hint = trouble.partition("\n")
-            return Alarm(message, hint)
-    return None
+        return f"{error.get('message', '')}\n{error.get('hint', '')}"
+    return model.flow.trouble or model.unreadable

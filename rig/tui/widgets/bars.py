@@ -1,9 +1,7 @@
-"""Top and bottom bars of every screen: title, problems, possible keys, and STOP."""
+"""Lines above and below every page: title, tabs, problems, possible keys, and STOP."""
 
 from collections.abc import Callable, Mapping
 
-from textual.app import ComposeResult
-from textual.containers import Vertical
 from textual.content import Content
 
 from rig.tui.actions import BY_NAME, PAGES, Action, shown_key
@@ -21,30 +19,15 @@ _TOLD_S = 4.0
 _UNANSWERED_S = 0.5
 
 
-class StatusBar(Vertical):
-    """Headline and tabs of pages, with problems and remedies below."""
-
-    def compose(self) -> ComposeResult:
-        yield Words(id="headline")
-        yield Words(id="tabs")
-        yield Words(id="alarm")
-
-    def show(self, model: Model, keys: Mapping[str, str], width: int, message: str) -> None:
-        """Draw the present state; `message` only without problems."""
-        self.query_one("#headline", Words).say(headline(model, width - 2))
-        self.query_one("#tabs", Words).say(_tabs(model.page, keys))
-        wrong = alarm(model)
-        box = self.query_one("#alarm", Words)
-        box.display = wrong is not None or bool(message)
-        box.set_class(wrong is None, "-told")
-        if wrong is None:
-            box.say(plain(message, 240))
-        else:
-            hint = f"\n  → {plain(wrong.hint, 240)}" if wrong.hint else ""
-            box.say(("✗ ", "bold $error"), (plain(wrong.message, 160), "bold"), hint)
+def problem(model: Model) -> Content:
+    """Return the most serious present problem with its remedy; empty without problems."""
+    message, _, hint = alarm(model).partition("\n")
+    remedy = f"\n  → {plain(hint, 240)}" if hint else ""
+    parts = ("✗ ", "bold $error"), (plain(message, 160), "bold"), remedy
+    return Content.assemble(*parts) if message else Content("")
 
 
-def _tabs(page: str, keys: Mapping[str, str]) -> Content:
+def tabs(page: str, keys: Mapping[str, str]) -> Content:
     """Return all pages with their keys; each can be clicked."""
     parts: list[Content] = []
     for name, title in TABS.items():
@@ -84,20 +67,6 @@ class StopLine(Words):
         self.set_class(model.hot, "-hot")
         stop = Content(f" ■ STOP  {shown_key(keys['stop'])} or Esc ")
         self.say(link_action(stop, "app.do('stop')"), f"  {_doing(model)}")
-
-
-class StopBar(Vertical):
-    """Keys of the page, and the STOP bar."""
-
-    def compose(self) -> ComposeResult:
-        yield Words(id="hints")
-        yield StopLine()
-
-    def show(
-        self, model: Model, keys: Mapping[str, str], width: int, possible: Callable[[Action], bool]
-    ) -> None:
-        """Draw the present state."""
-        self.query_one("#hints", Words).say(hints(model, keys, width - 2, possible))
 
 
 def hints(

@@ -1,11 +1,12 @@
 """Dialogs over a page. STOP remains visible below every dialog, and works."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 from textual import events, on
 from textual.app import ComposeResult
 from textual.await_complete import AwaitComplete
+from textual.binding import BindingType
 from textual.containers import Vertical, VerticalScroll
 from textual.content import Content
 from textual.fuzzy import Matcher
@@ -16,6 +17,8 @@ from textual.widgets.option_list import Option
 
 from rig.tui.widgets.bars import StopLine
 from rig.tui.widgets.text import Words
+
+_ARROWS: list[BindingType] = [("up", "move(-1)"), ("down", "move(1)")]
 
 
 class Dialog(ModalScreen[Any]):
@@ -29,10 +32,7 @@ class Dialog(ModalScreen[Any]):
         Description of its keys.
     """
 
-    LEAVE = ""
-    """Key that cancels; if empty, any key without another meaning."""
-
-    def __init__(self, *parts: Widget, keys: str = "", large: bool = False) -> None:
+    def __init__(self, *parts: Widget, keys: str = " ", large: bool = False) -> None:
         super().__init__()
         self._parts = [*parts, Words((keys, "bold $primary"), id="how")]
         self._large = large
@@ -41,16 +41,6 @@ class Dialog(ModalScreen[Any]):
         with Vertical(classes="-large" * self._large):
             yield from self._parts
         yield StopLine()
-
-    def on_mount(self) -> None:
-        self.query("Input").focus()
-
-    def move(self, by: int) -> None:
-        """Move in the list, or scroll."""
-        for options in self.query(OptionList):
-            (options.action_cursor_down if by > 0 else options.action_cursor_up)()
-        for text in self.query(VerticalScroll):
-            text.scroll_relative(y=3 * by, animate=False)
 
     def dismiss(self, result: Any = None) -> AwaitComplete:
         """Close with an answer, once: keys in quick succession may repeat it."""
@@ -71,8 +61,14 @@ class Confirm(Dialog):
 class TextDialog(Dialog):
     """A long text; any key but the arrows closes it."""
 
+    BINDINGS: ClassVar = _ARROWS
+
     def __init__(self, text: Content) -> None:
         super().__init__(VerticalScroll(Words(text, id="table"), can_focus=False), large=True)
+
+    def action_move(self, by: int) -> None:
+        """Scroll."""
+        self.query_one(VerticalScroll).scroll_relative(y=3 * by, animate=False)
 
 
 class _Choices(OptionList):
@@ -102,7 +98,7 @@ class Ask(Dialog):
         The choice that is highlighted first; `None` for none.
     """
 
-    LEAVE = "escape"
+    BINDINGS: ClassVar = [*_ARROWS, ("escape", "dismiss")]
 
     def __init__(
         self,
@@ -118,15 +114,13 @@ class Ask(Dialog):
         line = Input(text, max_length=200, select_on_focus=False, placeholder=hint)
         self._choices, self._free, self._first = choices, free, chosen
         self._list = _Choices(markup=False)
-        parts = [Words((question, "bold"), id="question"), line, *([self._list] * bool(choices))]
         keys = f"{'↑ ↓ ' * bool(choices)}Enter: {yes}   Esc: cancel"
-        super().__init__(*parts, keys=keys, large=bool(choices))
+        words = Words((question, "bold"), id="question")
+        super().__init__(words, line, self._list, keys=keys, large=bool(choices))
 
     def on_mount(self) -> None:
-        super().on_mount()
         self._fill("")
-        if self._choices:
-            self._list.highlighted = self._first
+        self._list.highlighted = self._first
 
     def _fill(self, query: str) -> None:
         """List the matching choices."""
@@ -140,17 +134,15 @@ class Ask(Dialog):
 
     @on(Input.Changed)
     def _filter_choices(self, event: Input.Changed) -> None:
-        if not self._free and self._list.is_mounted:
+        if not self._free:
             self._fill(event.value)
             self._list.action_first()
 
-    def move(self, by: int) -> None:
+    def action_move(self, by: int) -> None:
         """Select the previous or next choice."""
-        if self._choices:
-            super().move(by)
-            option = self._list.highlighted_option
-            if self._free and option is not None and option.id is not None:
-                self.query_one(Input).value = self._choices[int(option.id)]
+        (self._list.action_cursor_down if by > 0 else self._list.action_cursor_up)()
+        if self._free and self._list.highlighted is not None:
+            self.query_one(Input).value = self._choices[self._list.highlighted]
 
     @on(OptionList.OptionSelected)
     def _take_choice(self, event: OptionList.OptionSelected) -> None:

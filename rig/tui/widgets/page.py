@@ -42,9 +42,7 @@ class Page(Vertical):
         """Draw a page's content; `fresh` if another page was shown before."""
         contents = {"head": face.head, "list": face.menu, "words": face.words, "foot": face.foot}
         for name, content in contents.items():
-            words = self.query_one(f"#{name}", Words)
-            words.say(content)
-            words.display = bool(content.plain)
+            self.query_one(f"#{name}", Words).say(content)
         self.query_one("#menu").display = bool(face.menu.plain)
         self._parts(face, desk)
         count = self.query_one(Digits)

@@ -57,7 +57,7 @@ Styled: TypeAlias = "str | tuple[str, str]"
 
 
 class Words(Static):
-    """Text on a page."""
+    """Text on a page, which takes no room while it is empty."""
 
     def __init__(self, *parts: Styled | Content, id: str | None = None) -> None:  # noqa: A002
         super().__init__(markup=False, id=id)
@@ -73,6 +73,7 @@ class Words(Static):
             same = self._said is not None and self._fits(self._said) and self._fits(content)
             same = same and _lines(self._said) == _lines(content)
             self._said = content
+            self.display = bool(content.plain)
             if not same:
                 self._layout_updates += 1  # otherwise an outdated height is kept
             self.update(content, layout=not same)
