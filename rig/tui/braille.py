@@ -91,9 +91,11 @@ class Sheet:
         cells = zip(self._bits[row].tolist(), self._inks[row].tolist(), strict=True)
         colors = *self._colors, ""
         # Every font has a blank.
-        letters = [Span(chr(BLANK + bits) if bits else " ", colors[ink]) for bits, ink in cells]
-        for (line, column), letter in self._letters.items():
-            letters[column : column + (line == row)] = [letter] * (line == row)
+        letters = [
+            self._letters.get((row, column))
+            or Span(chr(BLANK + bits) if bits else " ", colors[ink])
+            for column, (bits, ink) in enumerate(cells)
+        ]
         runs = groupby(letters, key=itemgetter(1, 2))
         return [Span("".join(letter.text for letter in run), *look) for look, run in runs]
 

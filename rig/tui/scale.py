@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -27,14 +27,8 @@ _CORNERS = 17  # corners of a circle
 _COLORS = ("border", "foreground", "accent", "primary", "secondary", "success", "warning")
 
 
-class Stroke(NamedTuple):
-    """A straight line between two points, m, in a colour of the theme."""
-
-    x: float
-    z: float
-    to_x: float
-    to_z: float
-    color: str
+Stroke: TypeAlias = tuple[float, float, float, float, str]
+"""A straight line between two points, x before z, m, and its colour of the theme."""
 
 
 class Lamp(NamedTuple):
@@ -88,12 +82,12 @@ def drawing(
     middles = [pitch * (2.0 * column + 1.2) for column in range(len(falls))]
     for middle, fall in zip(middles, falls, strict=True):
         left, right = middle - half, middle + half
-        strokes += [Stroke(x, low, x, high, "border") for x in (left, right)]
+        strokes += [(x, low, x, high, "border") for x in (left, right)]
         for gate in protocol.gates.on(fall.role):
             lit = gate.channel in indicators.blocked_channels
             lamps.append(Lamp(gate.channel, left, gate.height, lit))
             end, color = (right, "warning") if lit else (left + 0.2 * half, "foreground")
-            strokes.append(Stroke(left, gate.height, end, gate.height, color))
+            strokes.append((left, gate.height, end, gate.height, color))
         expected, measured = fall.model_height(time_s), fall.measured_height(time_s)
         seen = expected if measured is None and fall.times.size else measured
         own = "primary" if fall.role == "impact" else "secondary"
@@ -102,7 +96,7 @@ def drawing(
                 strokes += _rods(protocol, fall, middle, height, color, top - bottom)
         if fall.role == "impact":
             fallen = half * math.tan(math.radians(run.incline_deg))
-            strokes.append(Stroke(left, fallen, right, -fallen, "foreground"))
+            strokes.append((left, fallen, right, -fallen, "foreground"))
     width = pitch * (2.0 * max(1, len(falls)) + 0.4)
     # Δz is known while both chains pass gates.
     until_s = min([time_s, *(float(fall.times[-1]) for fall in falls if fall.times.size)])
@@ -110,8 +104,8 @@ def drawing(
     apart_m = None
     if len(tops) > 1:
         at, apart_m = 2.2 * pitch, tops[1] - tops[0]
-        strokes.append(Stroke(at, tops[0], at, tops[1], "success"))
-        strokes += [Stroke(at - 0.03, z, at + 0.03, z, "success") for z in tops]
+        strokes.append((at, tops[0], at, tops[1], "success"))
+        strokes += [(at - 0.03, z, at + 0.03, z, "success") for z in tops]
     return Drawing(tuple(strokes), width, bottom, top, apart_m, tuple(lamps), tuple(middles))
 
 
@@ -134,11 +128,11 @@ def paint(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
         text = ",".join(str(lamp.channel) for lamp in near) + "○●"[lit]
         color = "warning" if lit else "foreground"
         sheet.write(row, max(0, column - len(text)), Span(text, color, bold=lit))
-    ends = np.array([[(s.x, s.z), (s.to_x, s.to_z)] for s in strokes]).reshape(-1, 2, 2)
-    inks = [_COLORS.index(stroke.color) for stroke in strokes]
+    ends = np.array([places for *places, _ in strokes]).reshape(-1, 2, 2)
+    inks = [_COLORS.index(color) for *_, color in strokes]
     sheet.strokes(scale * (np.array([left, top]) + ends * [1.0, -1.0]), inks)
     apart = "" if apart_m is None else f"  Δz {apart_m * 1e2:.1f} cm as it falls"
-    measured = {"primary", "secondary"} & {stroke.color for stroke in strokes}
+    measured = {"primary", "secondary"} & {color for *_, color in strokes}
     behind = Span(" behind measured" * bool(measured))
     words = [Span("model", "accent"), behind, Span(apart, "success", bold=True)]
     return [*sheet.rows(), words]
@@ -160,7 +154,7 @@ def _rods(
             (x + radius * math.cos(angle), height + radius * math.sin(angle))
             for angle in np.linspace(0.0, 2.0 * math.pi, _CORNERS)
         ]
-        yield from (Stroke(*start, *end, color) for start, end in pairwise(around))
+        yield from ((*start, *end, color) for start, end in pairwise(around))
         return
     lies = fall.role == "impact" and protocol.surface is not None
     for number, place in enumerate(rods.chain.heights):
@@ -169,4 +163,4 @@ def _rods(
         if lies and z < 0.0:
             z, tilt = 0.0, 0.0
         across, up = half * math.cos(tilt), half * math.sin(tilt)
-        yield Stroke(x - across, z - up, x + across, z + up, color)
+        yield x - across, z - up, x + across, z + up, color

@@ -15,11 +15,11 @@ class Figure(SpanView):
     def __init__(self) -> None:
         super().__init__()
         self._at = -PAUSE_S
-        self._shown: tuple[Picture | None, float | None] = (None, None)
+        self._shown: tuple[Picture, float | None] = ((), None)
 
-    def show(self, picture: Picture | None, moment: float | None) -> None:
-        """Draw another picture, at most once in `PAUSE_S`; hide the widget without a picture."""
-        self.display = picture is not None
+    def show(self, picture: Picture, moment: float | None) -> None:
+        """Draw another picture, at most once in `PAUSE_S`; hide the widget without a panel."""
+        self.display = bool(picture)
         if (picture, moment) != self._shown and monotonic() - self._at >= PAUSE_S:
             self._shown, self._at = (picture, moment), monotonic()
             self.on_resize()
@@ -27,5 +27,5 @@ class Figure(SpanView):
     def on_resize(self) -> None:
         """Draw the picture in the new size."""
         picture, moment = self._shown
-        if picture is not None and self.size:
+        if picture and self.size:
             self.take(draw_picture(picture, *self.size, moment))

@@ -1,6 +1,6 @@
 """The page widget: shows as many parts of a page's content as fit the screen."""
 
-from itertools import zip_longest
+from itertools import chain, repeat
 
 from textual.app import ComposeResult
 from textual.containers import Grid, Horizontal, Vertical, VerticalScroll
@@ -73,7 +73,7 @@ class Page(Vertical):
         turn = desk.chart % max(1, len(face.pictures)) if face.beside == 1 else 0
         pictures = [*face.pictures[turn:], *face.pictures[:turn]][: most * ("plots" in shown)]
         self.query_one("#plots").set_class(most > 1 and face.beside > 1, "-pairs")
-        for figure, picture in zip_longest(self.query(Figure), pictures):
+        for figure, picture in zip(self.query(Figure), chain(pictures, repeat(())), strict=False):
             figure.show(picture, face.moment)
 
     def scroll_tables(self, by: int) -> None:
