@@ -69,11 +69,6 @@ To change keys, write ~/.config/chainrig/keys.toml: reject = "r"
 ↑ ↓ scroll; any other key closes this page."""
 
 
-def possible(action: Action, stage: Stage, *, driving: bool) -> bool:
-    """Whether an action is possible in this stage."""
-    return stage in action.stages and (driving or not action.driving)
-
-
 def shown_key(keys: str) -> str:
     """Return the first key of an action as labelled on a keyboard."""
     first = keys.partition(",")[0]

@@ -20,7 +20,7 @@ from rig.campaign.machine import BEFORE_RELEASE, Flow, Stage
 from rig.errors import RigError
 from rig.text_rows import read_rows
 from rig.tui import commands
-from rig.tui.actions import BY_NAME, NEEDS_RIG, PAGES, Action, possible
+from rig.tui.actions import BY_NAME, NEEDS_RIG, PAGES, Action
 from rig.tui.ascii import AsciiFilter
 from rig.tui.client import ReconnectingClient
 from rig.tui.context import Options
@@ -119,9 +119,7 @@ class RigApp(App[None], inherit_bindings=False):
 
     def get_line_filters(self) -> Sequence[LineFilter]:
         """Return the filters applied to every line drawn."""
-        if not self.options.ascii:
-            return super().get_line_filters()
-        return (*super().get_line_filters(), AsciiFilter())
+        return [*super().get_line_filters(), *[AsciiFilter()] * self.options.ascii]
 
     # ------------------------------------------------------------------ life
 
@@ -135,7 +133,7 @@ class RigApp(App[None], inherit_bindings=False):
         if not self.options.offline:
             self.run_worker(self.client.keep(), group="client")
         elif self.options.session is not None:
-            self.follower.look_at(self.options.session)
+            self.begin(self.follower.show_file(self.options.session))
         self._follow()
         self.set_timer(TICK_S, self._tick)
         self.draw()
@@ -327,8 +325,8 @@ class RigApp(App[None], inherit_bindings=False):
 
     def next_theme(self) -> None:
         """Switch to the next colour theme."""
-        names = [theme.name for theme in THEMES]
-        self.theme = names[(names.index(self.theme) + 1) % len(names)]
+        following = THEMES.index(self.current_theme) + 1
+        self.theme = THEMES[following % len(THEMES)].name
 
     # ------------------------------------------------------------------ keys and mouse
 
@@ -419,7 +417,8 @@ class RigApp(App[None], inherit_bindings=False):
             return False
         # Without a rig, an operator may start with a new one.
         begins = action.name == "go_on" and self.flow.stage is Stage.PROTOCOL
-        return possible(action, self.flow.stage, driving=self.client.driving or begins)
+        is_held = self.client.driving or begins or not action.driving
+        return is_held and self.flow.stage in action.stages
 
     def action_choose(self, at: int) -> None:
         """Select a row of the home page."""

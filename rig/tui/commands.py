@@ -118,7 +118,7 @@ def _new(app: RigApp, row: Beginning) -> Work:
     return _run(app, "new", name, "--scene", row.value, "--yes", done=written)
 
 
-def _end_other(app: RigApp, row: Beginning) -> None:
+def _end_other(app: RigApp, _: Beginning) -> None:
     """Ask, then end the daemon of another port."""
     client = app.client
     if client.in_the_way is None:
@@ -129,7 +129,6 @@ def _end_other(app: RigApp, row: Beginning) -> None:
         with suppress(ProcessLookupError):
             os.kill(process, signal.SIGTERM)
 
-    del row
     _confirm(app, "end", end, port=plain(port, 40))
 
 
@@ -153,16 +152,6 @@ def _control(app: RigApp) -> Work:
     return None
 
 
-def _close(app: RigApp) -> None:
-    """Ask, then close the session, so that another can be chosen."""
-
-    def close() -> Work:
-        app.driver.asked = None
-        return _ask(app, "close_session")
-
-    _confirm(app, "close", close)
-
-
 def _quit(app: RigApp) -> None:
     """Ask, then quit."""
     kind = " trial" if app.client.is_trial else " offline" if app.options.offline else ""
@@ -173,11 +162,6 @@ def _confirm(app: RigApp, name: str, act: Callable[[], Work], **values: object) 
     """Ask a question of the table, then act."""
     title, question, yes = (text.format(**values) for text in _QUESTIONS[name])
     app.ask(Confirm(title, question, yes), lambda _: act())
-
-
-async def _ask(app: RigApp, method: str) -> None:
-    """Ask the daemon for something; see rig/daemon/API.md."""
-    await app.client.connection.call(method)
 
 
 def _try_release(app: RigApp) -> None:
@@ -232,7 +216,7 @@ def _move(app: RigApp, by: int) -> None:
     """Move in the list of a page, or scroll."""
     desk = app.desk
     if app.page == "history":
-        desk.choose(app.model, desk.players["history"].at + by)
+        desk.move(app.model, by)
     elif app.page == "protocol" and app.flow.stage is Stage.PROTOCOL and desk.rows:
         app.action_choose((desk.row + by) % len(desk.rows))
     else:
@@ -311,7 +295,7 @@ def _unblind(app: RigApp) -> None:
     if not app.model.blind:
         app.driver.take(Notice("this session is not blind\nwrite blind: true in its protocol"))
         return
-    _confirm(app, "unblind", lambda: _ask(app, "unblind"))
+    _confirm(app, "unblind", lambda: app.client.connection.call("unblind"))
 
 
 def _begin_check(app: RigApp) -> None:
@@ -344,7 +328,7 @@ _DO: dict[str, Callable[[RigApp], Work]] = {
     "quit": _quit,
     "go_on": _go_on,
     "control": _control,
-    "close": _close,
+    "close": lambda app: _confirm(app, "close", app.driver.close_session),
     "release_test": _try_release,
     "sessions": _sessions,
     "play": _change(Player.toggle_play),

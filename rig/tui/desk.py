@@ -124,16 +124,12 @@ class Desk:
         view = self.other or model.view
         return view if view and view.jobs else None
 
-    def job(self, model: Model) -> Job | None:
-        """Return the drop of the history page."""
-        view = self.view(model)
-        return view.jobs[self.players["history"].at % len(view.jobs)] if view else None
-
     def drop(self, model: Model) -> tuple[SessionView | None, Job | None]:
         """Return the drop of the shown page, once analysed."""
-        if model.page == "history":
-            return self.view(model), self.job(model)
         view, job = model.view, model.job
+        if model.page == "history":
+            view = self.view(model)
+            job = view.jobs[self.players["history"].at % len(view.jobs)] if view else None
         return (view, job) if view is not None and job in view.results else (None, None)
 
     def change(self, model: Model, change: Callable[[Player, float], Player]) -> None:
@@ -152,8 +148,8 @@ class Desk:
         if self.players[model.page].playing:
             self.change(model, lambda player, end_s: player.advance(seconds, end_s))
 
-    def choose(self, model: Model, at: int) -> None:
-        """Select a drop of the list, from its beginning."""
+    def move(self, model: Model, by: int) -> None:
+        """Select another drop of the history page, from its beginning."""
         view = self.view(model)
-        tape, count = self.players["history"], len(view.jobs) if view else 0
-        self.players["history"] = tape.other(at - tape.at, count)
+        player = self.players["history"]
+        self.players["history"] = player.other(by, len(view.jobs) if view else 1)

@@ -63,6 +63,11 @@ class Driver:
         await self.client.connection.call("open_session", **names)
         self.asked = protocol, session
 
+    async def close_session(self) -> None:
+        """Close the session, so that another can be chosen."""
+        self.asked = None
+        await self.client.connection.call("close_session")
+
     async def _carry_out(self, effect: Effect, ticket: int) -> None:
         """Carry out an effect, and handle the resulting event."""
         client, token = self.client, None

@@ -81,12 +81,9 @@ class Follower:
         """Number of drops of the file analysed so far."""
         return self._live.done if self._live else 0
 
-    def look_at(self, path: Path) -> None:
+    async def show_file(self, path: Path) -> None:
         """Show a file that has no writer."""
         self._forget(path)
-        self._begin(self._show_file())
-
-    async def _show_file(self) -> None:
         await self._read_quietly()
         if self.view is not None:
             self.state, self.indicators = state_of(self.view), Indicators.of(self.view.channels)
@@ -96,7 +93,8 @@ class Follower:
         self._path, self._live = live.path, live
 
     def _forget(self, path: Path | None = None) -> None:
-        self._path, self._live, self.view, self.voids = path, None, None, Voids()
+        self._path, self._live, self.view = path, None, None
+        self.voids, self.indicators = Voids(), Indicators()
 
     def absorb(self, stage: Stage, now: float, *, reopens: bool) -> list[Event]:
         """Take over the daemon's present state, and return events for its changes.
@@ -153,7 +151,7 @@ class Follower:
     ) -> None:
         path = Path(str(session["path"]))
         if self._path != path:
-            self._path, self._live, self.indicators = path, None, Indicators()
+            self._forget(path)
         self._wanted = (path, state.runs, session.get("blind"), int(now / _CLOCK_S))
         if self._wanted != self._read and not self._reading:
             self._reading = True

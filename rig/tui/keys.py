@@ -3,11 +3,10 @@
 import os
 import re
 import tomllib
-import unicodedata
 from collections.abc import Mapping
 from pathlib import Path
 
-from textual.keys import Keys
+from textual.keys import Keys, key_to_character
 
 from rig.errors import InputError
 from rig.files import read_input
@@ -18,6 +17,7 @@ ALWAYS = {"stop": "f9", "go_on": "enter"}
 _HOW = 'write one line for each action, such as reject = "r"'
 RESERVED = ("escape",)
 """Keys whose meaning is fixed."""
+_HELD = {"ctrl", "shift", "alt"}
 
 
 def default_file() -> Path:
@@ -112,13 +112,6 @@ def merge_keys(
 def _is_key(key: str) -> bool:
     """Whether a terminal may send a key, by Textual's names."""
     *held, last = key.split("+")
-    if not set(held) <= {"ctrl", "shift", "alt"}:
-        return False
-    if len(last) == 1:
-        return last.isalnum()  # other keys have names, such as question_mark
-    if last in {name.value for name in Keys}:
-        return True
-    try:
-        return bool(unicodedata.lookup(last.replace("_", " ")))
-    except KeyError:
-        return False
+    is_named = last in {name.value for name in Keys} or key_to_character(last) is not None
+    # Of single characters only letters and digits: others have names, such as question_mark.
+    return set(held) <= _HELD and (last.isalnum() if len(last) == 1 else is_named)
