@@ -104,7 +104,7 @@ class RigApp(App[None], inherit_bindings=False):
         flow = Flow(stage=start, countdown_s=options.countdown_s)
         self.driver: Driver = Driver(flow, self.client, self.follower, self.begin)
         self.desk = Desk(options)
-        self._faces: dict[str, Callable[[Model, Desk, int], Face]] = {}
+        self._faces: dict[str, Callable[[Model, Desk], Face]] = {}
         self._drawn = ""
         self._looked_s = 0.0
         self._stillness = Stillness(options.still_s)
@@ -205,7 +205,8 @@ class RigApp(App[None], inherit_bindings=False):
             for line in screen.query(StopLine):
                 line.show(model, self.keys)
         if self.page in self._faces:
-            face = self._faces[self.page](model, self.desk, self.sheet.tables_width())
+            self.desk.width = self.sheet.tables_width()
+            face = self._faces[self.page](model, self.desk)
             self.sheet.show(face, self.desk, fresh=self.page != self._drawn)
             self._drawn = self.page
         # The operator sees a drawing only after the refresh.
@@ -227,7 +228,7 @@ class RigApp(App[None], inherit_bindings=False):
     @property
     def model(self) -> Model:
         """Return the data of the pages at this moment."""
-        client, follower, offline = self.client, self.follower, self.options.offline
+        client, follower = self.client, self.follower
         return Model(
             state=follower.state,
             flow=self.flow,
@@ -236,16 +237,16 @@ class RigApp(App[None], inherit_bindings=False):
             indicators=follower.indicators,
             view=follower.view,
             voids=follower.voids,
-            connected=offline or client.up,
+            connected=client.up,
             driving=client.driving,
             now_s=monotonic(),
             silence=client.silence,
             port=client.port,
-            offline=offline,
+            offline=self.options.offline,
             unreadable=follower.unreadable,
             read=follower.done,
             page=self.page,
-            idle=client.idle and not offline,
+            idle=client.idle,
         )
 
     # ------------------------------------------------------------------ flow and pages
@@ -407,7 +408,7 @@ class RigApp(App[None], inherit_bindings=False):
         """Do an action of the table, if it is possible now."""
         action = BY_NAME[name]
         if self.possible(action):
-            commands.do(self, name)
+            self.begin(commands.DO[name](self))
         elif action.driving and not self.client.driving and not self.options.offline:
             self.driver.take(campaign.EffectFailure(self.flow.ticket, _WATCHING))
 

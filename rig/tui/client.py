@@ -169,17 +169,13 @@ class ReconnectingClient:
 
     async def keep(self) -> None:
         """Connect and reconnect until cancelled."""
-        try:
-            while True:
-                try:
-                    await self._once()
-                except RigError as error:
-                    self.silence = f"{error.message}\n{error.hint}"
-                self.changed = True
-                await asyncio.sleep(_AGAIN_S)
-        finally:
-            if self._client is not None:
-                await self._client.close()
+        while True:
+            try:
+                await self._once()
+            except RigError as error:
+                self.silence = f"{error.message}\n{error.hint}"
+            self.changed = True
+            await asyncio.sleep(_AGAIN_S)
 
     async def _once(self) -> None:
         """Connect once, and stay connected as long as possible."""

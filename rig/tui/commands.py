@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from functools import partial
 from importlib import import_module
 from itertools import count
+from operator import methodcaller
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,7 @@ from rig.analysis.result import GOOD
 from rig.campaign.machine import Again, GoOn, Note, Notice, Reject, Restore, Stage, StopRequest, Try
 from rig.reasons import notes_in
 from rig.text_rows import read_rows
-from rig.tui.actions import ACTIONS, help_text, shown_key
+from rig.tui.actions import ACTIONS, PAGES, help_text, shown_key
 from rig.tui.follow import open_live
 from rig.tui.replay import Player
 from rig.tui.widgets.dialogs import Ask, Confirm, TextDialog
@@ -38,20 +39,8 @@ if TYPE_CHECKING:
 _QUESTIONS = {name: texts for name, *texts in read_rows(__file__, "questions.txt")}
 REASONS = [reason for (reason,) in read_rows(__file__, "rejections.txt")]
 """Frequent reasons to reject a drop within its limits; the operator may type another."""
+_FLASH = "flash", "--board"
 _ONLY_ENTER = "only the Enter key arms the release\npress it half a second after any other key"
-
-
-def do(app: RigApp, name: str) -> None:
-    """Do an action of the table, which must be possible now.
-
-    Actions run synchronously, as their effect depends on the state when the key is handled. Only
-    work that waits for the daemon or files, which they return, runs in the background, and none of
-    that arms.
-    """
-    if name.startswith("page_"):
-        app.turn(name.removeprefix("page_"))
-    else:
-        app.begin(_DO[name](app))
 
 
 def _go_on(app: RigApp) -> Work:
@@ -105,11 +94,6 @@ def _connect(app: RigApp, row: Beginning) -> None:
         app.tell("plug the board in by USB; it appears here by itself")
 
 
-def _flash(app: RigApp, row: Beginning) -> None:
-    flash = partial(_run, app, "flash", "--board", row.value)
-    _confirm(app, "flash", flash)
-
-
 def _new(app: RigApp, row: Beginning) -> Work:
     """Draft a protocol under an unused name."""
     names = (f"my-{row.value}{number or ''}.yaml" for number in count())
@@ -136,7 +120,7 @@ _BEGIN: dict[str, Callable[[RigApp, Beginning], Work]] = {
     "try": _open,
     "open": _open,
     "board": _connect,
-    "flash": _flash,
+    "flash": lambda app, row: _confirm(app, "flash", lambda: _run(app, *_FLASH, row.value)),
     "new": _new,
     "end": _end_other,
     "results": lambda app, _: _sessions(app),
@@ -232,7 +216,7 @@ def _change(work: Callable[[Player, float], Player]) -> Callable[[RigApp], Work]
 
 def _write(app: RigApp, command: str, option: str, suffix: str) -> None:
     """Ask, then run a command that writes files of the shown session beside it."""
-    view = (app.desk.view(app.model) if app.page == "history" else None) or app.model.view
+    view = (app.desk.other if app.page == "history" else None) or app.model.view
     if view is None:
         app.tell(app.model.loading or "no session is open: press o to choose one")
         return
@@ -311,7 +295,7 @@ def _palette(app: RigApp) -> None:
     app.ask(question, lambda number: app.action_do(actions[number].name))
 
 
-_DO: dict[str, Callable[[RigApp], Work]] = {
+DO: dict[str, Callable[[RigApp], Work]] = {
     "stop": lambda app: app.driver.take(StopRequest()),
     "reject": _reject,
     "note": _note,
@@ -338,4 +322,10 @@ _DO: dict[str, Callable[[RigApp], Work]] = {
     "export": lambda app: _write(app, "export", "--csv", ".csv"),
     "slower": _change(lambda player, _: player.change_speed(0.5)),
     "faster": _change(lambda player, _: player.change_speed(2.0)),
+    **{f"page_{page}": methodcaller("turn", page) for page, *_ in PAGES},
 }
+"""Actions of the table, by name.
+
+They run synchronously, as their effect depends on the state when the key is handled. Only work that
+waits for the daemon or files, which they return, runs in the background, and none of that arms.
+"""

@@ -48,7 +48,7 @@ class Face(NamedTuple):
         Whether words come before the drawing.
     """
 
-    head: Content
+    head: Content = Content("")
     drawing: Drawing | None = None
     pictures: Sequence[Picture] = ()
     moment: float | None = None
@@ -75,6 +75,8 @@ class Desk:
         The latest drop whose slow motion was started.
     chart, part, row
         Number of switches of plot and of page part so far; the row of a list.
+    width
+        Columns of the tables.
     """
 
     def __init__(self, options: Options) -> None:
@@ -83,6 +85,7 @@ class Desk:
         self.other: SessionView | None = None
         self.chart = self.part = 0
         self.row = -1  # no row yet
+        self.width = 0
         self.opens_first = False
         self.rows: list[Beginning] = []
         self.opened: Path | None = None  # last protocol opened here

@@ -28,6 +28,8 @@ _UNSEEN = (
     "the daemon was lost during the fall\n"
     "daemon or board keeps the drop; it is analysed when the daemon is back"
 )
+_UNPLUGGED = "the port was lost before the release: nothing fell\narm again when it is back"
+_TAKEN = "another client took control of the rig\npress c to take it when it is free"
 _CLOCK_S = 3.0
 """Time between readings of the file, as clock samples also arrive between drops, s."""
 
@@ -122,11 +124,7 @@ class Follower:
             self._forget()
             events.append(campaign.SessionClose())
         if not client.driving and stage not in {Stage.LIVE, Stage.JUDGING}:
-            events.append(
-                campaign.Lost(
-                    "another client took control of the rig\npress c to take it when it is free"
-                )
-            )
+            events.append(campaign.Lost(_TAKEN))
         missed = job_to_judge(state.runs)
         if missed and missed not in self.judged and client.driving:
             events.append(campaign.Found(missed))
@@ -222,9 +220,7 @@ def _broken(stage: Stage, state: DaemonState) -> Iterator[Event]:
     if stage not in BEFORE_RELEASE:
         return
     if state.link == "down":
-        yield campaign.Lost(
-            "the port was lost before the release: nothing fell\narm again when it is back"
-        )
+        yield campaign.Lost(_UNPLUGGED)
     drop = state.section("drop")
     if stage is Stage.COUNTDOWN and drop.get("state") == "interrupted":
         line = state.line(drop["run"])

@@ -22,12 +22,11 @@ _FALLEN = 0.7  # share of the fall shown in small pictures
 _DOES = {kind: "\n".join(lines) for kind, *lines in read_paragraphs(__file__)}
 
 
-def face(model: Model, desk: Desk, width: int) -> Face:
+def face(model: Model, desk: Desk) -> Face:
     """Return the home page: possible beginnings, or the protocol of the open session."""
-    del width
     if model.flow.stage is not Stage.PROTOCOL and model.protocol is not None:
         words = _description(desk, model.protocol)
-        return Face(Content(""), _picture(desk, model.protocol), words=words, top=True)
+        return Face(drawing=_picture(desk, model.protocol), words=words, top=True)
     row = desk.chosen
     if row is None:
         return Face(Content("looking around …"))
@@ -39,7 +38,8 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     elif protocol is not None:
         parts.append(_description(desk, protocol))
         picture = _picture(desk, protocol)
-    return Face(Content(""), picture, words=Content("\n\n").join(parts), menu=_menu(desk), top=True)
+    words = Content("\n\n").join(parts)
+    return Face(drawing=picture, words=words, menu=_menu(desk), top=True)
 
 
 def _into(model: Model, desk: Desk, row: Beginning) -> str:

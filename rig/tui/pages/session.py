@@ -16,9 +16,8 @@ from rig.tui.plots import session_pictures
 from rig.tui.widgets.text import duration, plain
 
 
-def face(model: Model, desk: Desk, width: int) -> Face:
+def face(model: Model, desk: Desk) -> Face:
     """Return the session page: plan, results against incline, and control charts."""
-    del width
     view = model.view
     if view is None:
         return Face(_progress(model))

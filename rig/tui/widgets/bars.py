@@ -40,7 +40,7 @@ def tabs(page: str, keys: Mapping[str, str]) -> Content:
 def headline(model: Model, width: int) -> Content:
     """Return a line of exactly `width`: page and title left, SIMULATED mark and link right."""
     link = LINKS.get(model.state.link, "○ no link") if model.connected else "✗ no daemon"
-    if model.offline or model.idle:
+    if model.idle:
         link = "file only" if model.offline else "no rig yet"
     right_side = f"{plain(model.port, 24)}  {link}" if model.port else link
     stamp = " ▲ SIMULATED " * model.simulated
@@ -115,7 +115,7 @@ def _answer(model: Model) -> str:
 
 
 def _doing(model: Model) -> str:
-    if model.offline or model.idle:
+    if model.idle:
         return "no rig is connected: nothing can fall"
     if not model.connected:
         return _answer(model) or "no daemon: nothing can be stopped from here"

@@ -9,12 +9,6 @@ from rig.tui.indicators import Indicator, Indicators
 from rig.tui.model import Model
 
 _WIDE = 39
-_LOOKS = {
-    True: ("●", "$warning", "BLOCKED"),
-    False: ("○", "$success", "clear"),
-    None: ("?", "", "unknown"),
-}
-"""Sign, colour and word of a gate, by whether it is blocked; `None` if unknown."""
 
 
 def board(
@@ -43,12 +37,13 @@ def _line(gate: Gate, indicators: Indicators, now_s: float) -> Content:
     """Return the line of a gate."""
     lamps = (lamp for lamp in indicators.gates if lamp.channel == gate.channel)
     lamp = next(lamps, Indicator(gate.channel))
-    symbol, color, word = _LOOKS[lamp.blocked if indicators.known else None]
+    sign, color, word = ("●", "$warning", "BLOCKED") if lamp.blocked else ("○", "$success", "clear")
     works = "works ✓" if gate.channel in indicators.checked else ""
     quiet = "FLICKERS" if lamp.flickers(now_s) else works if lamp.steady(now_s) else "moving"
-    text = f" {gate.height * 1e3:6.1f} mm ch{gate.channel:<2} {word:7}{lamp.edges:4} "
-    text += quiet * indicators.known
-    return Content.assemble((symbol, f"bold {color}"), text[: _WIDE - 2].ljust(_WIDE - 1))
+    if not indicators.known:
+        sign, color, word, quiet = "?", "", "unknown", ""
+    text = f" {gate.height * 1e3:6.1f} mm ch{gate.channel:<2} {word:7}{lamp.edges:4} {quiet}"
+    return Content.assemble((sign, f"bold {color}"), text[: _WIDE - 2].ljust(_WIDE - 1))
 
 
 def label(model: Model, channel: int) -> str:
