@@ -177,7 +177,7 @@ async def _sessions(app: RigApp) -> None:
     whole = (at for at, entry in enumerate(entries) if not entry.trouble)
     title = f"Sessions in {plain(folder.resolve(), 80)}, newest first"
     lines = [_session_line(entry) for entry in entries]
-    question = Ask(title, choices=lines, free=False, yes="play", chosen=next(whole, 0))
+    question = Ask(title, choices=lines, yes="play", chosen=next(whole, 0))
     app.ask(question, lambda number: _look_at(app, entries[number]))
 
 
@@ -291,7 +291,7 @@ def _palette(app: RigApp) -> None:
     possible = filter(app.possible, ACTIONS)
     actions = [action for action in possible if action.name != "palette"]
     lines = [f"{shown_key(app.keys[action.name]):8}{action.text}" for action in actions]
-    question = Ask("Search commands", choices=lines, free=False, yes="run", chosen=0)
+    question = Ask("Search commands", choices=lines, yes="run", chosen=0)
     app.ask(question, lambda number: app.action_do(actions[number].name))
 
 

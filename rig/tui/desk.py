@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from textual.content import Content
 
+from rig.files import file_stamp
 from rig.records import Job
 from rig.tui.beginnings import HERE, Beginning, ProtocolFile, first_row, read_file
 from rig.tui.context import Options
@@ -109,11 +110,7 @@ class Desk:
 
     def reading(self, file: Path) -> ProtocolFile:
         """Return a protocol, read again if the file has changed, for example in an editor."""
-        try:
-            changed_ns = file.stat().st_mtime_ns
-        except OSError:
-            changed_ns = -1
-        return self.latest("reading", (file, changed_ns), lambda: read_file(file))
+        return self.latest("reading", (file, file_stamp(file)), lambda: read_file(file))
 
     def begin_with(self, rows: list[Beginning]) -> None:
         """Set the rows of the home page; select a new experiment, or keep the selection."""

@@ -6,6 +6,7 @@ It needs more of the program than the first paint, so it is loaded when a survey
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -71,30 +72,24 @@ def look_around(options: Options, port: str, other: str) -> list[Beginning]:
     if not boards and not port:
         boards.append(Beginning("Connect a board", "board", "none is plugged in"))
     sessions = session_list(Path())
-    going = [
-        Beginning(
-            "Continue",
-            "open",
-            f"{entry.title or entry.path.stem:.24}, {entry.over} of {entry.runs}",
-            named[entry.source],
-            "sim://" * entry.simulated,
-            entry.path,
-        )
-        for entry in sessions
-        if entry.over < entry.runs and entry.source in named
-    ]
+    readable = [entry for entry in sessions if not entry.trouble] or sessions
     return [
         *(row for row in scenes if row.kind == "try"),
         *boards,
-        *going[:3],
+        *islice(_unfinished(sessions, named), 3),
         *(Beginning(HERE, "open", path.stem, path) for path in files),
         *(row for row in scenes if row.kind == "new"),
-        *(
-            Beginning("Open results", "results", f"of {entry.path.stem}")
-            for entry in sorted(sessions, key=lambda entry: bool(entry.trouble))[:1]
-        ),
+        *(Beginning("Open results", "results", f"of {each.path.stem}") for each in readable[:1]),
         *(Beginning("Ready experiments", "open", path.stem, path) for path in ready),
     ]
+
+
+def _unfinished(sessions: list[SessionEntry], named: dict[str, Path]) -> Iterator[Beginning]:
+    for entry in sessions:
+        if entry.over < entry.runs and entry.source in named:
+            title = f"{entry.title or entry.path.stem:.24}, {entry.over} of {entry.runs}"
+            file, port = named[entry.source], "sim://" * entry.simulated
+            yield Beginning("Continue", "open", title, file, port, entry.path)
 
 
 def _boards() -> Iterator[Beginning]:

@@ -6,6 +6,7 @@ from pathlib import Path
 from textual.content import Content
 
 from rig.analysis.joint_fit import FEWEST
+from rig.analysis.session import Analysis
 from rig.campaign.plan import done
 from rig.report.columns import Part
 from rig.report.parts import means_parts, scatter_parts, tables
@@ -21,15 +22,9 @@ def face(model: Model, desk: Desk) -> Face:
     view = model.view
     if view is None:
         return Face(_progress(model))
-    key, summary = (view.path, view.reading), view.analysis.summary
-    means = desk.latest("means", key, lambda: _table(tables("means", summary)))
-    drops = desk.latest(
-        "drops",
-        key,
-        lambda: _table(
-            [*means_parts(summary), *scatter_parts(summary), *tables("runs", view.analysis.runs)]
-        ),
-    )
+    key = view.path, view.reading
+    means = desk.latest("means", key, lambda: _table(tables("means", view.analysis.summary)))
+    drops = desk.latest("drops", key, lambda: _drop_tables(view.analysis))
     head = Content("\n").join([_progress(model), means])
     shown = desk.latest("charts", key, lambda: [*session_pictures(view)])
     turned = desk.chart % max(1, len(shown))
@@ -37,6 +32,11 @@ def face(model: Model, desk: Desk) -> Face:
     foot = pictures[0][1] if pictures else ""
     drawn = [picture for picture, _ in pictures]
     return Face(head, pictures=drawn, foot=Content(foot), beside=2, words=drops)
+
+
+def _drop_tables(analysis: Analysis) -> Content:
+    means, runs = analysis.summary, analysis.runs
+    return _table([*means_parts(means), *scatter_parts(means), *tables("runs", runs)])
 
 
 def _progress(model: Model) -> Content:

@@ -91,11 +91,9 @@ class Ask(Dialog):
         Initial text.
     choices
         Choices instead of typing.
-    free
-        Whether other (not empty) text may be typed. Otherwise the text searches the choices, and
-        the answer is the number of a choice.
     chosen
-        The choice that is highlighted first; `None` for none.
+        The choice that is highlighted first: the text then searches the choices, and the answer is
+        the number of a choice. If `None`, other (not empty) text may be typed.
     """
 
     BINDINGS: ClassVar = [*_ARROWS, ("escape", "dismiss")]
@@ -106,10 +104,10 @@ class Ask(Dialog):
         text: str = "",
         choices: Sequence[str] = (),
         *,
-        free: bool = True,
         yes: str = "save",
         chosen: int | None = None,
     ) -> None:
+        free = chosen is None
         hint = "type to search" if not free else "type, or choose below with ↑ ↓" if choices else ""
         line = Input(text, max_length=200, select_on_focus=False, placeholder=hint)
         self._choices, self._free, self._first = choices, free, chosen
