@@ -95,14 +95,14 @@ class RigApp(App[None], inherit_bindings=False):
         self.options = options
         self.keys: Mapping[str, str] = keys
         self.action_of = {key: name for name, text in keys.items() for key in text.split(",")}
-        self.page: str = ""
         # Offline it is never connected.
         self.client = client or ReconnectingClient(options.port, options.socket, self._resume)
         self._loaded = loaded
-        self.follower = Follower(self.client, self.begin)
         start = Stage.DONE if options.offline else Stage.PROTOCOL
         flow = Flow(stage=start, countdown_s=options.countdown_s)
-        self.driver: Driver = Driver(flow, self.client, self.follower, self.begin)
+        self.model = Model(self.client, flow, options.offline)
+        self.follower = Follower(self.model, self.begin)
+        self.driver: Driver = Driver(self.model, self.follower, self.begin)
         self.desk = Desk(options)
         self._faces: dict[str, Callable[[Model, Desk], Face]] = {}
         self._drawn = ""
@@ -165,16 +165,16 @@ class RigApp(App[None], inherit_bindings=False):
         if not self._open():
             return
         self._stillness.alive(now)
-        if self.flow.stage is Stage.COUNTDOWN:
+        if self.model.flow.stage is Stage.COUNTDOWN:
             self.driver.take(campaign.Tick(min(passed, _COUNTED_S)))
         self.desk.tick(self.model, passed)
-        if self.flow.stage is Stage.PROTOCOL and now - self._looked_s >= _LOOK_S:
+        if self.model.flow.stage is Stage.PROTOCOL and now - self._looked_s >= _LOOK_S:
             self._looked_s = now
             self.begin(self._look_around())
         if self.client.changed and not self.options.offline:
             self.client.changed = False
             reopens = self.driver.asked is not None
-            for event in self.follower.absorb(self.flow.stage, now, reopens=reopens):
+            for event in self.follower.absorb(reopens=reopens):
                 self.driver.take(event)
         if self.model.hot:
             while len(self.screen_stack) > 1:
@@ -191,10 +191,10 @@ class RigApp(App[None], inherit_bindings=False):
         if not self._open() or not self.screen_stack[0].query(StopLine):
             return  # the screen is opening or closing
         model, width = self.model, self.size.width - 2
-        wrong, is_told = problem(model), model.now_s - self._told_s < _TOLD_S
+        wrong, is_told = problem(model), monotonic() - self._told_s < _TOLD_S
         lines: dict[str, Content | str] = {
             "headline": headline(model, width),
-            "tabs": tabs(self.page, self.keys),
+            "tabs": tabs(self.model.page, self.keys),
             "problem": wrong,
             "told": plain(self._told, 240) if is_told and not wrong else "",
             "hints": hints(model, self.keys, width, self.possible),
@@ -204,50 +204,19 @@ class RigApp(App[None], inherit_bindings=False):
         for screen in self.screen_stack:
             for line in screen.query(StopLine):
                 line.show(model, self.keys)
-        if self.page in self._faces:
+        if self.model.page in self._faces:
             self.desk.width = self.sheet.tables_width()
-            face = self._faces[self.page](model, self.desk)
-            self.sheet.show(face, self.desk, fresh=self.page != self._drawn)
-            self._drawn = self.page
+            face = self._faces[self.model.page](model, self.desk)
+            self.sheet.show(face, self.desk, fresh=self.model.page != self._drawn)
+            self._drawn = self.model.page
         # The operator sees a drawing only after the refresh.
         self.call_after_refresh(self._stillness.shown, self._face)
 
     @property
     def _face(self) -> Hashable:
         """Return the part of the view on which the meaning of a key depends."""
-        flow = self.flow
-        return self.page, flow.stage, flow.job, self.client.driving, id(self.screen)
-
-    # ------------------------------------------------------------------ what is known
-
-    @property
-    def flow(self) -> Flow:
-        """State of the campaign."""
-        return self.driver.flow
-
-    @property
-    def model(self) -> Model:
-        """Return the data of the pages at this moment."""
-        client, follower = self.client, self.follower
-        return Model(
-            state=follower.state,
-            flow=self.flow,
-            stop=self.driver.stop,
-            disk_s=client.disk_s,
-            indicators=follower.indicators,
-            view=follower.view,
-            voids=follower.voids,
-            connected=client.up,
-            driving=client.driving,
-            now_s=monotonic(),
-            silence=client.silence,
-            port=client.port,
-            offline=self.options.offline,
-            unreadable=follower.unreadable,
-            read=follower.done,
-            page=self.page,
-            idle=client.idle,
-        )
+        flow = self.model.flow
+        return self.model.page, flow.stage, flow.job, self.client.driving, id(self.screen)
 
     # ------------------------------------------------------------------ flow and pages
 
@@ -285,7 +254,7 @@ class RigApp(App[None], inherit_bindings=False):
 
     def turn(self, page: str) -> None:
         """Show a page, beginning with its first part."""
-        self.page = page
+        self.model.page = page
         self.desk.part = self.desk.chart = 0
         self.draw()
 
@@ -304,7 +273,7 @@ class RigApp(App[None], inherit_bindings=False):
         )
         self.desk.begin_with(rows)
         self.draw()
-        if self.desk.opens_first and self.page == "protocol":
+        if self.desk.opens_first and self.model.page == "protocol":
             self.action_do("go_on")
         self.desk.opens_first = False
 
@@ -366,7 +335,7 @@ class RigApp(App[None], inherit_bindings=False):
             return True
         if isinstance(screen, Dialog):
             return self._answers(screen, key, at_s)
-        if key == "enter" and self.page == "run" and self.flow.stage is Stage.PREPARE:
+        if key == "enter" and self.model.page == "run" and self.model.flow.stage is Stage.PREPARE:
             self._arm(at_s)
         elif name is not None:
             self.action_do(name)
@@ -374,7 +343,7 @@ class RigApp(App[None], inherit_bindings=False):
 
     def _ends_countdown(self) -> bool:
         """Stop a countdown to a release; return whether there was any."""
-        if self.flow.stage not in BEFORE_RELEASE:
+        if self.model.flow.stage not in BEFORE_RELEASE:
             return False
         self.driver.take(campaign.StopRequest())
         return True
@@ -410,16 +379,16 @@ class RigApp(App[None], inherit_bindings=False):
         if self.possible(action):
             self.begin(commands.DO[name](self))
         elif action.driving and not self.client.driving and not self.options.offline:
-            self.driver.take(campaign.EffectFailure(self.flow.ticket, _WATCHING))
+            self.driver.take(campaign.EffectFailure(self.model.flow.ticket, _WATCHING))
 
     def possible(self, action: Action) -> bool:
         """Whether an action is possible now."""
         if self.options.offline and (action.driving or action.name in NEEDS_RIG):
             return False
         # Without a rig, an operator may start with a new one.
-        begins = action.name == "go_on" and self.flow.stage is Stage.PROTOCOL
+        begins = action.name == "go_on" and self.model.flow.stage is Stage.PROTOCOL
         is_held = self.client.driving or begins or not action.driving
-        return is_held and self.flow.stage in action.stages
+        return is_held and self.model.flow.stage in action.stages
 
     def action_choose(self, at: int) -> None:
         """Select a row of the home page."""

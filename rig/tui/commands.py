@@ -45,14 +45,14 @@ _ONLY_ENTER = "only the Enter key arms the release\npress it half a second after
 
 def _go_on(app: RigApp) -> Work:
     """Take the next step of the flow, but never arm: see `rig.tui.app.RigApp._arm`."""
-    stage = app.driver.flow.stage
-    if stage is Stage.PREPARE and app.page == "run":
+    stage = app.model.flow.stage
+    if stage is Stage.PREPARE and app.model.page == "run":
         app.driver.take(Notice(_ONLY_ENTER))
     elif stage is Stage.PREPARE:
         app.turn("run")
     elif stage is not Stage.PROTOCOL:
         app.driver.take(GoOn(app.model.next_job))
-    elif app.page != "protocol":
+    elif app.model.page != "protocol":
         app.turn("protocol")
     elif (row := app.desk.chosen) is None:
         app.desk.opens_first = True
@@ -159,7 +159,7 @@ def _try_release(app: RigApp) -> None:
 
 
 def _note(app: RigApp) -> None:
-    text = " · ".join(notes_in(app.driver.flow.reasons))
+    text = " · ".join(notes_in(app.model.flow.reasons))
     app.ask(Ask("Note on this drop:", text), lambda text: app.driver.take(Note(text)))
 
 
@@ -199,9 +199,9 @@ def _session_line(entry: SessionEntry) -> str:
 def _move(app: RigApp, by: int) -> None:
     """Move in the list of a page, or scroll."""
     desk = app.desk
-    if app.page == "history":
+    if app.model.page == "history":
         desk.move(app.model, by)
-    elif app.page == "protocol" and app.flow.stage is Stage.PROTOCOL and desk.rows:
+    elif app.model.page == "protocol" and app.model.flow.stage is Stage.PROTOCOL and desk.rows:
         app.action_choose((desk.row + by) % len(desk.rows))
     else:
         app.sheet.scroll_tables(by)
@@ -216,7 +216,7 @@ def _change(work: Callable[[Player, float], Player]) -> Callable[[RigApp], Work]
 
 def _write(app: RigApp, command: str, option: str, suffix: str) -> None:
     """Ask, then run a command that writes files of the shown session beside it."""
-    view = (app.desk.other if app.page == "history" else None) or app.model.view
+    view = (app.desk.other if app.model.page == "history" else None) or app.model.view
     if view is None:
         app.tell(app.model.loading or "no session is open: press o to choose one")
         return
@@ -283,7 +283,7 @@ def _unblind(app: RigApp) -> None:
 
 
 def _begin_check(app: RigApp) -> None:
-    app.follower.indicators = app.follower.indicators.reset()
+    app.model.indicators = app.model.indicators.reset()
 
 
 def _palette(app: RigApp) -> None:

@@ -6,11 +6,10 @@ from time import monotonic
 from typing import Any
 
 from rig.campaign import machine as campaign
-from rig.campaign.machine import Effect, Event, Flow, Stage, effect_failure, step
+from rig.campaign.machine import Effect, Event, Stage, effect_failure, step
 from rig.errors import DeviceTimeoutError, RigError
-from rig.tui.client import ReconnectingClient
 from rig.tui.follow import Follower
-from rig.tui.model import StopAnswer
+from rig.tui.model import Model, StopAnswer
 
 
 @dataclass
@@ -19,58 +18,56 @@ class Driver:
 
     Parameters
     ----------
-    flow
-        State of the campaign.
-    client
-        Client that carries out effects; `None` without a daemon.
+    model
+        Where the state of the campaign is, and the client that carries out effects.
     follower
         Reader of the session.
     begin
         Runs a coroutine in the background.
 
-    stop
-        Answer to the latest STOP; `None` before the first.
+    Attributes
+    ----------
     asked
         Protocol and session that were opened from here; `None` after they were closed.
     """
 
-    flow: Flow
-    client: ReconnectingClient
+    model: Model
     follower: Follower
     begin: Callable[[Coroutine[Any, Any, None]], object]
-    stop: StopAnswer | None = None
     asked: tuple[str, str] | None = None
 
     def take(self, event: Event) -> None:
         """Handle an event, and carry out its effects."""
-        self.flow, effects = step(self.flow, event)
-        if self.flow.stage is Stage.RESULT and self.flow.job is not None:
-            self.follower.judged.add(self.flow.job)
+        model = self.model
+        flow, effects = step(model.flow, event)
+        model.flow = flow
+        if flow.stage is Stage.RESULT and flow.job is not None:
+            self.follower.judged.add(flow.job)
         for effect in effects:
-            if isinstance(effect, campaign.Stop) and self.client.idle:
+            if isinstance(effect, campaign.Stop) and model.client.idle:
                 continue  # without a rig, no chain can fall
             if isinstance(effect, campaign.Stop):
-                self.stop = StopAnswer(monotonic())
-            self.begin(self._carry_out(effect, self.flow.ticket))
+                model.stop = StopAnswer(monotonic())
+            self.begin(self._carry_out(effect, flow.ticket))
 
     def refuse(self, error: RigError) -> None:
         """Show an error with its remedy."""
-        self.take(effect_failure(self.flow.ticket, error))
+        self.take(effect_failure(self.model.flow.ticket, error))
 
     async def open_session(self, protocol: str, session: str, seed: int | None) -> None:
         """Open a session in the daemon, now and after each restart."""
         names = {"protocol": protocol, "session": session, "seed": seed}
-        await self.client.connection.call("open_session", **names)
+        await self.model.client.connection.call("open_session", **names)
         self.asked = protocol, session
 
     async def close_session(self) -> None:
         """Close the session, so that another can be chosen."""
         self.asked = None
-        await self.client.connection.call("close_session")
+        await self.model.client.connection.call("close_session")
 
     async def _carry_out(self, effect: Effect, ticket: int) -> None:
         """Carry out an effect, and handle the resulting event."""
-        client, token = self.client, None
+        client, token = self.model.client, None
         try:
             match effect:
                 case campaign.GiveUp():
@@ -94,7 +91,7 @@ class Driver:
                     await client.connection.call("log_state", **job._asdict(), **verdict)
                 case campaign.Judge(job):
                     result = (await self.follower.read()).results[job]
-                    row = self.follower.voids.row
+                    row = self.model.voids.row
                     self.take(campaign.DropVerdict(ticket, result.verdict, result.reasons, row))
                     return
         except RigError as error:
@@ -107,13 +104,14 @@ class Driver:
 
         The daemon answers within a second, even without an answer of the board.
         """
-        asked, is_known = self.stop, False
-        while not is_known and asked is self.stop:
+        model, is_known = self.model, False
+        asked = model.stop
+        while not is_known and asked is model.stop:
             try:
-                await self.client.connection.call("stop", reason=reason)
+                await model.client.connection.call("stop", reason=reason)
             except RigError as error:
                 heard, is_known = False, not isinstance(error, DeviceTimeoutError)
             else:
                 heard = is_known = True
-            if asked is not None and asked is self.stop:
-                asked = self.stop = asked._replace(heard=heard)
+            if asked is not None and asked is model.stop:
+                asked = model.stop = asked._replace(heard=heard)

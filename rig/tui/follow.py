@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Coroutine, Iterator, Mapping
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 
 from rig.campaign import machine as campaign
@@ -15,6 +16,7 @@ from rig.errors import RigError
 from rig.records import Job
 from rig.tui.client import ReconnectingClient
 from rig.tui.indicators import Indicators
+from rig.tui.model import Model
 from rig.tui.state import DaemonState, state_of
 
 if TYPE_CHECKING:
@@ -39,86 +41,60 @@ class Follower:
 
     Parameters
     ----------
-    client
-        Client of the daemon; `None` to show only a file.
+    model
+        Where the state is written.
     begin
         Runs a coroutine in the background.
 
     Attributes
     ----------
-    state
-        Latest state of the daemon.
-    indicators
-        State of the gates.
-    view
-        Latest view of the session file.
-    voids
-        Void drops by the session's log.
     judged
         Drops with a verdict from this screen.
-    unreadable
-        Why the session file cannot be read; empty if it can.
     """
 
-    def __init__(
-        self, client: ReconnectingClient, begin: Callable[[Coroutine[Any, Any, None]], object]
-    ) -> None:
-        self.state = DaemonState()
-        self.indicators = Indicators()
-        self.view: SessionView | None = None
-        self.voids = Voids()
+    def __init__(self, model: Model, begin: Callable[[Coroutine[Any, Any, None]], object]) -> None:
         self.judged: set[Job] = set()
-        self.unreadable = ""
-        self._client = client
+        self._model = model
         self._begin = begin
         self._path: Path | None = None
-        self._live: LiveAnalysis | None = None
         self._reading = self._fitting = False
         self._wanted: object = None
         self._read: object = None
         self._counted: tuple[Job | None, int] = (None, 0)
 
-    @property
-    def done(self) -> int:
-        """Number of drops of the file analysed so far."""
-        return self._live.done if self._live else 0
-
     async def show_file(self, path: Path) -> None:
         """Show a file that has no writer."""
         self._forget(path)
         await self._read_quietly()
-        if self.view is not None:
-            self.state, self.indicators = state_of(self.view), Indicators.of(self.view.channels)
+        model, view = self._model, self._model.view
+        if view is not None:
+            model.state, model.indicators = state_of(view), Indicators.of(view.channels)
 
     def look_with(self, live: LiveAnalysis) -> None:
         """Show a file with an existing live analysis."""
-        self._path, self._live = live.path, live
+        self._path, self._model.live = live.path, live
 
     def _forget(self, path: Path | None = None) -> None:
-        self._path, self._live, self.view = path, None, None
-        self.voids, self.indicators = Voids(), Indicators()
+        self._path, model = path, self._model
+        model.live, model.view, model.voids, model.indicators = None, None, Voids(), Indicators()
 
-    def absorb(self, stage: Stage, now: float, *, reopens: bool) -> list[Event]:
+    def absorb(self, *, reopens: bool) -> list[Event]:
         """Take over the daemon's present state, and return events for its changes.
 
         Parameters
         ----------
-        stage
-            Present stage of the campaign.
-        now
-            Monotonic time, s.
         reopens
             Whether a closed session will be opened again from here.
         """
-        client, before = self._client, self.state
-        state = self.state = client.state
-        self._look_at_gates(state, now)
+        client, before, stage = self._model.client, self._model.state, self._model.flow.stage
+        state = self._model.state = client.state
+        self._look_at_gates(state)
         if not client.up:
             return [campaign.Lost(_UNHEARD if stage in BEFORE_RELEASE else _UNSEEN)]
         events: list[Event] = [*_back(client, state), *_broken(stage, state)]
         session = state.section("session")
         if session:
-            self._look_at_session(session, state, now)
+            self._look_at_session(session, state)
             events.append(campaign.SessionOpen())
         elif before.section("session") and not reopens:
             self._forget()
@@ -130,27 +106,26 @@ class Follower:
             events.append(campaign.Found(missed))
         return events
 
-    def _look_at_gates(self, state: DaemonState, now: float) -> None:
-        if self.view and not self.indicators.gates:
-            self.indicators, self._counted = Indicators.of(self.view.channels), (None, 0)
+    def _look_at_gates(self, state: DaemonState) -> None:
+        model, now = self._model, monotonic()
+        if model.view and not model.indicators.gates:
+            model.indicators, self._counted = Indicators.of(model.view.channels), (None, 0)
         drop = state.section("drop")
         job = Job(drop["run"], drop["attempt"]) if drop else None
         last, counted = self._counted
         fresh = state.edges[counted if job == last else 0 :]
         if fresh and drop.get("state") == "fired":
             channels = tuple(int(edge[1]) for edge in fresh)
-            self.indicators = self.indicators.count_edges(channels, now)
+            model.indicators = model.indicators.count_edges(channels, now)
         else:
-            self.indicators = self.indicators.seen(state.blocked_mask, now)
+            model.indicators = model.indicators.seen(state.blocked_mask, now)
         self._counted = job, len(state.edges)
 
-    def _look_at_session(
-        self, session: Mapping[str, object], state: DaemonState, now: float
-    ) -> None:
+    def _look_at_session(self, session: Mapping[str, object], state: DaemonState) -> None:
         path = Path(str(session["path"]))
         if self._path != path:
             self._forget(path)
-        self._wanted = (path, state.runs, session.get("blind"), int(now / _CLOCK_S))
+        self._wanted = (path, state.runs, session.get("blind"), int(monotonic() / _CLOCK_S))
         if self._wanted != self._read and not self._reading:
             self._reading = True
             self._begin(self._read_quietly())
@@ -165,20 +140,20 @@ class Follower:
         RigError
             It cannot be read.
         """
-        path, request = self._path, self._wanted
+        path, request, model = self._path, self._wanted, self._model
         if path is None:
             raise RigError("no session is open")
         self._reading = True
         try:
-            if self._live is None:
-                self._live = await asyncio.to_thread(open_live, path)
-            live = self._live
+            if model.live is None:
+                model.live = await asyncio.to_thread(open_live, path)
+            live = model.live
             view = await asyncio.to_thread(live.read)
         finally:
             self._reading, self._read = False, request
         if path == self._path:
-            self.view, self.unreadable, self.voids = view, "", voids_of(view.states)
-            self._client.changed = True
+            model.view, model.unreadable, model.voids = view, "", voids_of(view.states)
+            model.client.changed = True
         if view.lagging and not self._fitting:
             self._fitting = True
             self._begin(self._fit_jointly(live, view))
@@ -188,14 +163,14 @@ class Follower:
         try:
             await self.read()
         except RigError as error:
-            self.unreadable = f"{error.message}\n{error.hint}"
+            self._model.unreadable = f"{error.message}\n{error.hint}"
 
     async def _fit_jointly(self, live: LiveAnalysis, view: SessionView) -> None:
         try:
             await asyncio.to_thread(live.fit_jointly, view)
         finally:
             self._fitting = False
-        if live is self._live:
+        if live is self._model.live:
             await self._read_quietly()
 
 

@@ -13,12 +13,13 @@ from rig.protocol.protocol import Protocol, Run
 from rig.reasons import Reason
 from rig.recorder.run_lines import RunLine
 from rig.records import Job
+from rig.tui.client import ReconnectingClient
 from rig.tui.indicators import Indicators
 from rig.tui.state import DaemonState
 from rig.vocabulary import ANY_SCENE, Vocabulary
 
 if TYPE_CHECKING:
-    from rig.results.live import SessionView
+    from rig.results.live import LiveAnalysis, SessionView
 
 SLOW_DISK_S = 0.5
 """Duration of a disk write that is a problem, s: normal writes take milliseconds, and messages of
@@ -38,55 +39,47 @@ class StopAnswer(NamedTuple):
     heard: bool | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass
 class Model:
-    """Data of the screens at a moment.
+    """Data of the screens, as the parts of the program that know them write them here.
 
     Attributes
     ----------
-    voids
-        Void drops by the session's log.
-    connected
-        Whether the daemon answers.
-    driving
-        Whether this screen has control of the rig.
-    now_s
-        Monotonic time, s.
-    silence
-        Why the daemon does not answer.
+    client
+        Connection to the daemon.
+    flow
+        State of the campaign.
     offline
         Whether only a file is shown.
+    state
+        Latest state of the daemon.
+    indicators
+        State of the gates.
+    live
+        Analysis of the session file, while a session is open.
+    view
+        Latest view of the session file.
+    voids
+        Void drops by the session's log.
     unreadable
-        Why the session file cannot be read.
-    read
-        Number of its drops analysed so far.
+        Why the session file cannot be read; empty if it can.
     stop
-        State of the latest STOP.
-    disk_s
-        Duration of the present disk write, s.
+        State of the latest STOP; `None` before the first.
     page
         The page that is shown.
-    idle
-        Whether no rig was ever requested or connected, which is not a fault.
     """
 
-    state: DaemonState
+    client: ReconnectingClient
     flow: Flow
-    indicators: Indicators
+    offline: bool = False
+    state: DaemonState = field(default_factory=DaemonState)
+    indicators: Indicators = field(default_factory=Indicators)
+    live: LiveAnalysis | None = None
     view: SessionView | None = None
     voids: Voids = field(default_factory=Voids)
-    connected: bool = False
-    driving: bool = False
-    now_s: float = 0.0
-    silence: str = ""
-    port: str = ""
-    offline: bool = False
     unreadable: str = ""
-    read: int = 0
     stop: StopAnswer | None = None
-    disk_s: float = 0.0
     page: str = ""
-    idle: bool = False
 
     @property
     def protocol(self) -> Protocol | None:
@@ -124,7 +117,7 @@ class Model:
         if self.offline:
             return latest
         drop = self.state.section("drop")
-        if drop and not self.driving:
+        if drop and not self.client.driving:
             return Job(drop["run"], drop["attempt"])
         if self.flow.stage in _BETWEEN:
             return latest if self.page == "result" and latest else self.next_job
@@ -144,12 +137,12 @@ class Model:
         waits = self.offline or bool(self.state.section("session"))
         if self.view is not None or self.unreadable or not waits:
             return ""
-        return f"Loading the session: {self.read} drops so far …"
+        return f"Loading the session: {self.live.done if self.live else 0} drops so far …"
 
     @property
     def stage(self) -> Stage:
         """Stage of the session: from our own flow, or for a watcher from the daemon."""
-        if self.driving or not self.connected:
+        if self.client.driving or not self.client.up:
             return self.flow.stage
         seen = WATCHED.get(str(self.state.section("drop").get("state")))
         return self.flow.stage if seen is None else seen
@@ -200,14 +193,14 @@ class Model:
 
 def alarm(model: Model) -> str:
     """Return the most serious present problem, and its remedy on a second line; or nothing."""
-    if not model.connected and not model.idle:
-        silence, _, hint = model.silence.partition("\n")
+    if not model.client.up and not model.client.idle:
+        silence, _, hint = model.client.silence.partition("\n")
         begun = model.flow.stage is not Stage.PROTOCOL
         parts = [hint, "reconnecting", *[_ALONE] * begun]
         return f"no daemon: {silence or 'connecting'}\n{'; '.join(filter(None, parts))}"
-    if model.disk_s > SLOW_DISK_S:
+    if model.client.disk_s > SLOW_DISK_S:
         return (
-            f"the disk has not finished a write for {model.disk_s:.1f} s\n"
+            f"the disk has not finished a write for {model.client.disk_s:.1f} s\n"
             "nothing is lost, and an armed board has switched itself off; check whether the disk "
             "is full, asleep or on a network, and whether another program uses the file"
         )

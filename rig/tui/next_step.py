@@ -1,5 +1,6 @@
 """The next step: a common source for the page's coloured line, the footer, and Enter."""
 
+from time import monotonic
 from typing import NamedTuple
 
 from rig.campaign.machine import Stage
@@ -50,20 +51,20 @@ def next_step(model: Model) -> NextStep:
 def _situation(model: Model) -> str:
     """Name the situation; the device refuses to arm before all preparations are done."""
     stage, indicators = model.stage, model.indicators
-    elsewhere = model.page != "protocol" if stage is Stage.PROTOCOL else not model.driving
+    elsewhere = model.page != "protocol" if stage is Stage.PROTOCOL else not model.client.driving
     cases = [
         (model.offline, "offline"),
         (elsewhere and stage in {Stage.PROTOCOL, Stage.COUNTDOWN}, f"{stage} elsewhere"),
         (stage in _PASSING, stage),
-        (model.connected and not model.driving, "watching"),
+        (model.client.up and not model.client.driving, "watching"),
         # What comes next depends on the verdict.
         (stage is Stage.RESULT and not model.flow.logged, "unsaved"),
         (stage in {Stage.RESULT, Stage.DONE} and model.next_job is None, f"{stage} last"),
         (stage is not Stage.PREPARE or model.page != "run", stage),
-        (not model.connected or model.state.link != "up", "no device"),
+        (not model.client.up or model.state.link != "up", "no device"),
         (not indicators.known, "no gates"),
         (indicators.blocked_channels, "blocked"),
-        (indicators.restless(model.now_s), "moving"),
+        (indicators.restless(monotonic()), "moving"),
     ]
     return next((situation for holds, situation in cases if holds), "ready")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from time import monotonic
 from typing import TYPE_CHECKING
 
 from textual.content import Content
@@ -40,11 +41,11 @@ def face(model: Model, desk: Desk) -> Face:
     if model.loading or protocol is None or run is None:
         return Face(Content(model.loading or next_step(model).text))
     falls, rig = hanging(model, desk)
-    counting = model.stage is Stage.COUNTDOWN and model.driving
+    counting = model.stage is Stage.COUNTDOWN and model.client.driving
     expected = desk.latest("expected", (protocol, run), lambda: expected_words(protocol, run))
     height = f"{protocol.of(run).drop.value * 1e3:.0f} mm {protocol.drop_from}"
     facts = f"drop   {height}\nmodel  {expected}\n"
-    gates = board(protocol, model.indicators, model.now_s, desk.width)
+    gates = board(protocol, model.indicators, desk.width)
     return Face(
         Content("\n").join([steps(model), _headline(model, run), _action(model)]),
         rig,
@@ -70,7 +71,7 @@ def steps(model: Model) -> Content:
     indicators = model.indicators
     behind = _DONE.get(model.stage, 0)
     clear = indicators.known and not indicators.blocked_channels
-    still = clear and not indicators.restless(model.now_s)
+    still = clear and not indicators.restless(monotonic())
     signs = {hand(model): False, "Clear": clear, "Still": still, "Drop": False, "Result": False}
     parts = []
     for at, (name, seen) in enumerate(signs.items()):
@@ -139,7 +140,7 @@ def _result(model: Model, desk: Desk) -> Face:
     )
     words = desk.latest("words", key, lambda: Content(number_table(view, job)))
     time_s = player.time_s if begun else seen[-1].tick / hz if seen else 0.0
-    gates = board(view.protocol, indicators, 0.0, desk.width)
+    gates = board(view.protocol, indicators, desk.width)
     said = "slow motion …" if own and player.playing else sentence(view, job)
     foot = Content.assemble((said, "bold $success"), "\n" * bool(said), past_runs(view, job))
     return Face(

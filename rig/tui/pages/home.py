@@ -45,7 +45,7 @@ def face(model: Model, desk: Desk) -> Face:
 def _into(model: Model, desk: Desk, row: Beginning) -> str:
     """Return the rig and session file of an experiment in words."""
     session = plain(row.session or desk.options.session or "")
-    rig = model.port or "a simulation: no board is connected"
+    rig = model.client.port or "a simulation: no board is connected"
     return f"→ Enter opens it with {rig}\n→ session file: {session or 'a new one'}"
 
 

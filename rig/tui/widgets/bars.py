@@ -1,6 +1,7 @@
 """Lines above and below every page: title, tabs, problems, possible keys, and STOP."""
 
 from collections.abc import Callable, Mapping
+from time import monotonic
 
 from textual.content import Content
 
@@ -39,10 +40,10 @@ def tabs(page: str, keys: Mapping[str, str]) -> Content:
 
 def headline(model: Model, width: int) -> Content:
     """Return a line of exactly `width`: page and title left, SIMULATED mark and link right."""
-    link = LINKS.get(model.state.link, "○ no link") if model.connected else "✗ no daemon"
-    if model.idle:
+    link = LINKS.get(model.state.link, "○ no link") if model.client.up else "✗ no daemon"
+    if model.client.idle:
         link = "file only" if model.offline else "no rig yet"
-    right_side = f"{plain(model.port, 24)}  {link}" if model.port else link
+    right_side = f"{plain(model.client.port, 24)}  {link}" if model.client.port else link
     stamp = " ▲ SIMULATED " * model.simulated
     blind = " BLIND " * model.blind
     name = TABS.get(model.page, model.page).upper()
@@ -97,7 +98,7 @@ def _label(name: str, model: Model) -> str:
     if name == "unblind" and not model.blind:
         return ""
     if name == "control":
-        return "" if model.driving else "take control"
+        return "" if model.client.driving else "take control"
     return BY_NAME[name].label
 
 
@@ -105,9 +106,9 @@ def _answer(model: Model) -> str:
     """Return the result of a recent STOP in words."""
     if model.stop is None:
         return ""
-    waited = model.now_s - model.stop.at_s
+    waited = monotonic() - model.stop.at_s
     unheard = model.stop.heard is False or (model.stop.heard is None and waited > _UNANSWERED_S)
-    if waited > _TOLD_S and (model.connected or not unheard):
+    if waited > _TOLD_S and (model.client.up or not unheard):
         return ""
     if unheard:
         return "STOP NOT CONFIRMED: switch the release's supply off"
@@ -115,14 +116,14 @@ def _answer(model: Model) -> str:
 
 
 def _doing(model: Model) -> str:
-    if model.idle:
+    if model.client.idle:
         return "no rig is connected: nothing can fall"
-    if not model.connected:
+    if not model.client.up:
         return _answer(model) or "no daemon: nothing can be stopped from here"
     answer = _answer(model)
     if answer and not model.hot:
         return answer
     holder = model.state.holder
-    watching = "" if model.driving or holder is None else f" · watching {holder[:24]}"
+    watching = "" if model.client.driving or holder is None else f" · watching {holder[:24]}"
     doing = next_step(model).text if model.stage in UNDER_WAY else model.state.phase
     return doing + watching + " · " * bool(answer) + answer
