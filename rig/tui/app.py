@@ -89,7 +89,7 @@ class RigApp(App[None], inherit_bindings=False):
         options: Options,
         keys: Mapping[str, str],
         client: ReconnectingClient | None = None,
-        loaded: Callable[[], object] | None = None,
+        loaded: Callable[[], object] = lambda: None,
     ) -> None:
         super().__init__(driver_class=Terminal)
         self.options = options
@@ -105,7 +105,6 @@ class RigApp(App[None], inherit_bindings=False):
         self.driver: Driver = Driver(self.model, self.follower, self.begin)
         self.desk = Desk(options)
         self._faces: dict[str, Callable[[Model, Desk], Face]] = {}
-        self._drawn = ""
         self._looked_s = 0.0
         self._stillness = Stillness(options.still_s)
         self._last = self._due = monotonic()
@@ -151,7 +150,7 @@ class RigApp(App[None], inherit_bindings=False):
         try:
             await work
         except RigError as error:
-            self.driver.refuse(error)
+            self.driver.take(campaign.effect_failure(self.model.flow.ticket, error))
 
     async def _tick(self) -> None:
         # Ten times a second, or down to five if that takes too much processor time for long.
@@ -194,7 +193,7 @@ class RigApp(App[None], inherit_bindings=False):
         wrong, is_told = problem(model), monotonic() - self._told_s < _TOLD_S
         lines: dict[str, Content | str] = {
             "headline": headline(model, width),
-            "tabs": tabs(self.model.page, self.keys),
+            "tabs": tabs(model.page, self.keys),
             "problem": wrong,
             "told": plain(self._told, 240) if is_told and not wrong else "",
             "hints": hints(model, self.keys, width, self.possible),
@@ -204,11 +203,10 @@ class RigApp(App[None], inherit_bindings=False):
         for screen in self.screen_stack:
             for line in screen.query(StopLine):
                 line.show(model, self.keys)
-        if self.model.page in self._faces:
+        if model.page in self._faces:
             self.desk.width = self.sheet.tables_width()
-            face = self._faces[self.model.page](model, self.desk)
-            self.sheet.show(face, self.desk, fresh=self.model.page != self._drawn)
-            self._drawn = self.model.page
+            face = self._faces[model.page](model, self.desk)
+            self.sheet.show(face, self.desk)
         # The operator sees a drawing only after the refresh.
         self.call_after_refresh(self._stillness.shown, self._face)
 
@@ -244,8 +242,7 @@ class RigApp(App[None], inherit_bindings=False):
             self._faces[page] = loaded.face
             self.draw()
         await asyncio.to_thread(import_module, "rig.results.live")
-        if self._loaded is not None:
-            self._loaded()
+        self._loaded()
 
     @property
     def sheet(self) -> Page:
@@ -256,6 +253,7 @@ class RigApp(App[None], inherit_bindings=False):
         """Show a page, beginning with its first part."""
         self.model.page = page
         self.desk.part = self.desk.chart = 0
+        self.sheet.rewind()
         self.draw()
 
     def turn_on(self, part: int = 0, chart: int = 0) -> None:
@@ -267,10 +265,7 @@ class RigApp(App[None], inherit_bindings=False):
     async def _look_around(self) -> None:
         """Update the list of the home page: sessions, protocols and boards."""
         survey = await asyncio.to_thread(import_module, "rig.tui.survey")
-        port, other = self.client.port, self.client.in_the_way
-        rows = await asyncio.to_thread(
-            survey.look_around, self.options, port, other[0] if other else ""
-        )
+        rows = await asyncio.to_thread(survey.look_around, self.options, self.client)
         self.desk.begin_with(rows)
         self.draw()
         if self.desk.opens_first and self.model.page == "protocol":
@@ -383,12 +378,11 @@ class RigApp(App[None], inherit_bindings=False):
 
     def possible(self, action: Action) -> bool:
         """Whether an action is possible now."""
-        if self.options.offline and (action.driving or action.name in NEEDS_RIG):
-            return False
+        has_rig = not self.options.offline or action.name not in NEEDS_RIG
         # Without a rig, an operator may start with a new one.
         begins = action.name == "go_on" and self.model.flow.stage is Stage.PROTOCOL
         is_held = self.client.driving or begins or not action.driving
-        return is_held and self.model.flow.stage in action.stages
+        return has_rig and is_held and self.model.flow.stage in action.stages
 
     def action_choose(self, at: int) -> None:
         """Select a row of the home page."""

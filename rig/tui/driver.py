@@ -50,10 +50,6 @@ class Driver:
                 model.stop = StopAnswer(monotonic())
             self.begin(self._carry_out(effect, flow.ticket))
 
-    def refuse(self, error: RigError) -> None:
-        """Show an error with its remedy."""
-        self.take(effect_failure(self.model.flow.ticket, error))
-
     async def open_session(self, protocol: str, session: str, seed: int | None) -> None:
         """Open a session in the daemon, now and after each restart."""
         names = {"protocol": protocol, "session": session, "seed": seed}

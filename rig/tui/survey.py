@@ -19,6 +19,7 @@ from rig.results.whole import protocol_of
 from rig.session.store import Session
 from rig.text_rows import read_rows
 from rig.tui.beginnings import HERE, Beginning
+from rig.tui.client import ReconnectingClient
 from rig.tui.context import Options
 from rig.usb.listing import serial_ports
 
@@ -48,16 +49,8 @@ class SessionEntry(NamedTuple):
     trouble: str = ""
 
 
-def look_around(options: Options, port: str, other: str) -> list[Beginning]:
-    """Return the rows of the home page from the folder, ready protocols and USB devices.
-
-    Parameters
-    ----------
-    port
-        Port of the connected rig; empty for none.
-    other
-        Port of a daemon that blocks the wanted one; empty for none.
-    """
+def look_around(options: Options, client: ReconnectingClient) -> list[Beginning]:
+    """Return the rows of the home page from the folder, ready protocols and USB devices."""
     ready = [*ready_protocols().values()]
     own = [*options.files, *sorted(Path().glob("[!.]*.yaml"))]
     files = [*{path.resolve(): path for path in own if path.resolve() not in ready}.values()]
@@ -67,9 +60,10 @@ def look_around(options: Options, port: str, other: str) -> list[Beginning]:
         for section, kind, name, value, title in read_rows(__file__)
     ]
     boards = [*_boards()]
-    if other:
-        boards.append(Beginning("Connect a board", "end", f"end {other}, which runs already"))
-    if not boards and not port:
+    if client.in_the_way is not None:
+        title = f"end {client.in_the_way[0]}, which runs already"
+        boards.append(Beginning("Connect a board", "end", title))
+    if not boards and not client.port:
         boards.append(Beginning("Connect a board", "board", "none is plugged in"))
     sessions = session_list(Path())
     readable = [entry for entry in sessions if not entry.trouble] or sessions

@@ -74,32 +74,25 @@ def hints(
     model: Model, keys: Mapping[str, str], width: int, possible: Callable[[Action], bool]
 ) -> Content:
     """Return the most important keys now; all others are in the palette."""
+    labels = {name: action.label for name, action in BY_NAME.items()}
+    labels["go_on"] = next_step(model).enter
+    labels["control"] = "" if model.client.driving else "take control"
+    labels["unblind"] *= model.blind
+    if model.flow.verdict == "rejected":
+        labels["reject"] = "undo rejection"
     page = _OF_PAGE.get(model.page, ())
     parts: list[Content] = []
     used = 0
     for name in (*dict.fromkeys((*page, *_ANYWHERE)), "palette"):
-        label = _label(name, model)
         full = len(parts) == 2 * (KEYS_SHOWN - 1) and name != "palette"
-        if full or not label or not possible(BY_NAME[name]):
+        if full or not labels[name] or not possible(BY_NAME[name]):
             continue
-        hint = Content.assemble((shown_key(keys[name]), "bold $primary"), f" {label}")
+        hint = Content.assemble((shown_key(keys[name]), "bold $primary"), f" {labels[name]}")
         used += len(hint) + 2
         if used > width:
             break
         parts += [link_action(hint, f"app.do('{name}')"), Content("  ")]
     return Content.assemble(*parts)
-
-
-def _label(name: str, model: Model) -> str:
-    if name == "go_on":
-        return next_step(model).enter
-    if name == "reject" and model.flow.verdict == "rejected":
-        return "undo rejection"
-    if name == "unblind" and not model.blind:
-        return ""
-    if name == "control":
-        return "" if model.client.driving else "take control"
-    return BY_NAME[name].label
 
 
 def _answer(model: Model) -> str:

@@ -38,8 +38,8 @@ class Page(Vertical):
         """Columns of the tables in the latest layout."""
         return max(20, (self.query_one("#tables").size.width or self.app.size.width) - 3)
 
-    def show(self, face: Face, desk: Desk, *, fresh: bool) -> None:
-        """Draw a page's content; `fresh` if another page was shown before."""
+    def show(self, face: Face, desk: Desk) -> None:
+        """Draw a page's content."""
         contents = {"head": face.head, "list": face.menu, "words": face.words, "foot": face.foot}
         for name, content in contents.items():
             self.query_one(f"#{name}", Words).say(content)
@@ -48,9 +48,6 @@ class Page(Vertical):
         count = self.query_one(Digits)
         count.display = bool(face.digits)
         count.update(face.digits)
-        if fresh:
-            for name in ("top", "tables"):
-                self.query_one(f"#{name}", VerticalScroll).scroll_home(animate=False)
 
     def _parts(self, face: Face, desk: Desk) -> None:
         """Show as many parts as fit, beginning with the selected part."""
@@ -75,6 +72,11 @@ class Page(Vertical):
         self.query_one("#plots").set_class(most > 1 and face.beside > 1, "-pairs")
         for figure, picture in zip(self.query(Figure), chain(pictures, repeat(())), strict=False):
             figure.show(picture, face.moment)
+
+    def rewind(self) -> None:
+        """Scroll to the beginning."""
+        for name in ("top", "tables"):
+            self.query_one(f"#{name}", VerticalScroll).scroll_home(animate=False)
 
     def scroll_tables(self, by: int) -> None:
         """Scroll the parts that do not fit, except the menu."""
