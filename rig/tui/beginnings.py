@@ -45,11 +45,9 @@ class Beginning(NamedTuple):
 
 def first_row(rows: list[Beginning], options: Options) -> int:
     """Return the row to select first: a blocking daemon, unfinished session, file or trial."""
-    for at, row in enumerate(rows):
-        if row.kind == "end":
-            return at
     sections = "Continue" * (not options.port), HERE, "Ready experiments"
-    places = [
+    places = [(False, -1, at) for at, row in enumerate(rows) if row.kind == "end"]
+    places += [
         (bool(read_file(row.file).problem), sections.index(row.section), at)
         for at, row in enumerate(rows)
         if row.section in sections and row.file and (row.session or row.file in options.files)

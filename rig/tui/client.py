@@ -238,10 +238,9 @@ class ReconnectingClient:
         """Start a daemon that outlives this screen until it is idle."""
         if not self.url:
             raise error
-        now = asyncio.get_running_loop().time()
-        if now - self._started_at < _START_S:
+        if monotonic() - self._started_at < _START_S:
             return
-        self._started_at = now
+        self._started_at = monotonic()
         if self.daemon is not None:
             self.daemon.poll()  # reaps the previous process
         prepare_folder(self.path.parent)

@@ -151,11 +151,10 @@ def _confirm(app: RigApp, name: str, act: Callable[[], Work], **values: object) 
 def _try_release(app: RigApp) -> None:
     """Ask, then drive the release once."""
     app.turn("device")
-    view = app.model.view
-    if view is None:
-        return
-    values = {"pulse_ms": view.protocol.release.pulse * 1e3, "body": view.protocol.vocabulary.body}
-    _confirm(app, "release_test", lambda: app.driver.take(Try()), **values)
+    protocol = app.model.protocol
+    if protocol is not None:
+        values = {"pulse_ms": protocol.release.pulse * 1e3, "body": protocol.vocabulary.body}
+        _confirm(app, "release_test", lambda: app.driver.take(Try()), **values)
 
 
 def _note(app: RigApp) -> None:

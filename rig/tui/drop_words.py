@@ -75,18 +75,14 @@ def number_table(view: SessionView, job: Job) -> str:
 
     "Alone" is the result of the drop by itself, "together" that of the session's joint fit.
     """
-    alone, run = view.results[job], view.plan[job.run]
-    joint = (
-        drop
-        for drop in view.analysis.runs
-        if view.fitted and (drop.run.number, drop.attempt) == job
-    )
-    results = {"alone": alone} | dict(zip(("together",), joint, strict=False))
+    runs = view.analysis.runs if view.fitted else ()
+    joint = (drop for drop in runs if (drop.run.number, drop.attempt) == job)
+    results = dict(zip(("alone", "together"), (view.results[job], *joint), strict=False))
     lines = []
     for part in tables("runs", results.values()):
         names = [name for name, _ in part.head]
         lines += text_table([["", *results], *zip(names, *part.rows, strict=True)], left={0})
         lines += part.sentences
-    expected = expected_words(view.protocol, run)
-    lines += [f"model  {expected}"] if expected else []
+    expected = expected_words(view.protocol, view.plan[job.run])
+    lines += [f"model  {expected}"] * bool(expected)
     return "\n".join(lines)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import numpy as np
 
 from rig.protocol.contact import of_run
-from rig.protocol.protocol import Protocol, RodChain, Run
+from rig.protocol.protocol import Protocol, Run
 from rig.tui.braille import COLUMNS, ROWS, Sheet, Span
 from rig.tui.indicators import Indicators
 
@@ -72,7 +72,7 @@ def drawing(
     protocol = of_run(protocol, run)
     strokes: list[Stroke] = []
     lamps: list[Lamp] = []
-    pitch = 2.4 * max((_rod_m(fall.rods) for fall in falls), default=_WIDTH_M)
+    pitch = 2.4 * max((fall.rods.rod_length or _WIDTH_M for fall in falls), default=_WIDTH_M)
     half, length = 0.5 * pitch, max((fall.length for fall in falls), default=0.0)
     heights = [gate.height for gate in protocol.gates.gates] or [0.0]
     low, high = min(heights) - _MARGIN_M, max(heights) + _MARGIN_M
@@ -138,16 +138,12 @@ def paint(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
     return [*sheet.rows(), words]
 
 
-def _rod_m(rods: RodChain) -> float:
-    return rods.rod_length or _WIDTH_M
-
-
 def _rods(
     protocol: Protocol, fall: ChainFall, x: float, height: float, color: str, shown_m: float
 ) -> Iterator[Stroke]:
     """Yield rods and strings, with struck rods at the contact point, or a round object."""
     rods = fall.rods
-    half = 0.5 * _rod_m(rods)
+    half = 0.5 * (rods.rod_length or _WIDTH_M)
     if protocol.vocabulary.part == "object":
         radius = max(0.5 * rods.widths[0], _BALL * shown_m)
         around = [

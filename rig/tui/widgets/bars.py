@@ -80,19 +80,15 @@ def hints(
     labels["unblind"] *= model.blind
     if model.flow.verdict == "rejected":
         labels["reject"] = "undo rejection"
-    page = _OF_PAGE.get(model.page, ())
-    parts: list[Content] = []
-    used = 0
-    for name in (*dict.fromkeys((*page, *_ANYWHERE)), "palette"):
-        full = len(parts) == 2 * (KEYS_SHOWN - 1) and name != "palette"
-        if full or not labels[name] or not possible(BY_NAME[name]):
-            continue
+    names = dict.fromkeys((*_OF_PAGE.get(model.page, ()), *_ANYWHERE))
+    useful = [name for name in names if labels[name] and possible(BY_NAME[name])]
+    line = Content("")
+    for name in (*useful[: KEYS_SHOWN - 1], "palette"):
         hint = Content.assemble((shown_key(keys[name]), "bold $primary"), f" {labels[name]}")
-        used += len(hint) + 2
-        if used > width:
+        if len(line) + len(hint) + 2 > width:
             break
-        parts += [link_action(hint, f"app.do('{name}')"), Content("  ")]
-    return Content.assemble(*parts)
+        line = Content.assemble(line, link_action(hint, f"app.do('{name}')"), "  ")
+    return line
 
 
 def _answer(model: Model) -> str:

@@ -75,16 +75,15 @@ class Page(Vertical):
 
     def rewind(self) -> None:
         """Scroll to the beginning."""
-        for name in ("top", "tables"):
-            self.query_one(f"#{name}", VerticalScroll).scroll_home(animate=False)
+        for part in self.query("#top, #tables"):
+            part.scroll_home(animate=False)
 
     def scroll_tables(self, by: int) -> None:
         """Scroll the parts that do not fit, except the menu."""
-        for part in self.query(VerticalScroll):
-            if part.id != "menu":
-                part.scroll_relative(y=by, animate=False)
+        for part in self.query("#top, #tables"):
+            part.scroll_relative(y=by, animate=False)
 
     def show_row(self, line: int) -> None:
         """Scroll the list so that a line is visible."""
-        menu = self.query_one("#menu", VerticalScroll)
+        menu = self.query_one("#menu")
         menu.scroll_to(y=line - menu.size.height // 2, animate=False)
