@@ -30,7 +30,7 @@ from rig.tui.follow import Follower
 from rig.tui.model import Model
 from rig.tui.stillness import Stillness
 from rig.tui.terminal import Terminal
-from rig.tui.widgets.bars import StopLine, headline, hints, problem, tabs
+from rig.tui.widgets.bars import headline, hints, problem, stop_line, tabs
 from rig.tui.widgets.dialogs import Ask, Confirm, Dialog, TextDialog
 from rig.tui.widgets.page import Page
 from rig.tui.widgets.text import Words, plain
@@ -125,8 +125,7 @@ class RigApp(App[None], inherit_bindings=False):
     def compose(self) -> ComposeResult:
         yield from (Words(id=name) for name in ("headline", "tabs", "problem", "told"))
         yield Page()
-        yield Words(id="hints")
-        yield StopLine()
+        yield from (Words(id=name) for name in ("hints", "stop"))
 
     async def on_mount(self) -> None:
         if not self.options.offline:
@@ -187,7 +186,7 @@ class RigApp(App[None], inherit_bindings=False):
 
     def draw(self) -> None:
         """Draw all changes since the last drawing."""
-        if not self._open() or not self.screen_stack[0].query(StopLine):
+        if not self._open() or not self.screen_stack[0].query("#stop"):
             return  # the screen is opening or closing
         model, width = self.model, self.size.width - 2
         wrong, is_told = problem(model), monotonic() - self._told_s < _TOLD_S
@@ -197,12 +196,13 @@ class RigApp(App[None], inherit_bindings=False):
             "problem": wrong,
             "told": plain(self._told, 240) if is_told and not wrong else "",
             "hints": hints(model, self.keys, width, self.possible),
+            "stop": stop_line(model, self.keys),
         }
-        for name, text in lines.items():
-            self.screen_stack[0].query_one(f"#{name}", Words).say(text)
         for screen in self.screen_stack:
-            for line in screen.query(StopLine):
-                line.show(model, self.keys)
+            screen.set_class(model.hot, "-hot")
+            for words in screen.query(Words):
+                if words.id in lines:
+                    words.say(lines[words.id])
         if model.page in self._faces:
             self.desk.width = self.sheet.tables_width()
             face = self._faces[model.page](model, self.desk)

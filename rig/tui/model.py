@@ -144,8 +144,7 @@ class Model:
         """Stage of the session: from our own flow, or for a watcher from the daemon."""
         if self.client.driving or not self.client.up:
             return self.flow.stage
-        seen = WATCHED.get(str(self.state.section("drop").get("state")))
-        return self.flow.stage if seen is None else seen
+        return WATCHED.get(str(self.state.section("drop").get("state")), self.flow.stage)
 
     @property
     def hot(self) -> bool:

@@ -15,7 +15,6 @@ import numpy as np
 from rig.protocol.contact import of_run
 from rig.protocol.protocol import Protocol, Run
 from rig.tui.braille import COLUMNS, ROWS, Sheet, Span
-from rig.tui.indicators import Indicators
 
 if TYPE_CHECKING:
     from rig.tui.motion import ChainFall
@@ -56,7 +55,7 @@ class Drawing(NamedTuple):
 
 
 def drawing(
-    protocol: Protocol, run: Run, falls: Sequence[ChainFall], indicators: Indicators, time_s: float
+    protocol: Protocol, run: Run, falls: Sequence[ChainFall], blocked: Sequence[int], time_s: float
 ) -> Drawing:
     """Return the measured chains over those of the model, between the posts of their gates.
 
@@ -64,8 +63,8 @@ def drawing(
     ----------
     falls
         Falls from `rig.tui.motion.motions`.
-    indicators
-        State of the gates at that time; blocked gates are highlighted.
+    blocked
+        Channels of the gates that are blocked at that time, which are highlighted.
     time_s
         Time since the release fired, s.
     """
@@ -84,7 +83,7 @@ def drawing(
         left, right = middle - half, middle + half
         strokes += [(x, low, x, high, "border") for x in (left, right)]
         for gate in protocol.gates.on(fall.role):
-            lit = gate.channel in indicators.blocked_channels
+            lit = gate.channel in blocked
             lamps.append(Lamp(gate.channel, left, gate.height, lit))
             end, color = (right, "warning") if lit else (left + 0.2 * half, "foreground")
             strokes.append((left, gate.height, end, gate.height, color))

@@ -61,8 +61,9 @@ def hanging(model: Model, desk: Desk) -> tuple[tuple[ChainFall, ...], Drawing | 
     if protocol is None or run is None:
         return (), None
     falls = desk.latest("falls", (protocol, run), lambda: motions(protocol, run))
-    seen = protocol, run, model.indicators.blocked_channels
-    rig = desk.latest("rig", seen, lambda: drawing(protocol, run, falls, model.indicators, 0.0))
+    blocked = model.indicators.blocked_channels
+    key = protocol, run, blocked
+    rig = desk.latest("rig", key, lambda: drawing(protocol, run, falls, blocked, 0.0))
     return falls, rig
 
 
@@ -145,7 +146,7 @@ def _result(model: Model, desk: Desk) -> Face:
     foot = Content.assemble((said, "bold $success"), "\n" * bool(said), past_runs(view, job))
     return Face(
         Content("\n").join(parts or _which(view, job, player)),
-        drawing(view.protocol, run, falls, indicators, time_s),
+        drawing(view.protocol, run, falls, indicators.blocked_channels, time_s),
         pictures,
         player.time_s - (falls[0].delay_s if falls else 0.0) if begun else None,
         Content("\n").join([words, Content(""), *gates]),

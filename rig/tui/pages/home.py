@@ -13,7 +13,6 @@ from rig.protocol.protocol import Protocol
 from rig.text_rows import read_paragraphs
 from rig.tui.beginnings import Beginning
 from rig.tui.desk import Desk, Face
-from rig.tui.indicators import Indicators
 from rig.tui.model import Model
 from rig.tui.motion import motions
 from rig.tui.scale import Drawing, drawing
@@ -65,7 +64,7 @@ def _picture(protocol: Protocol) -> Drawing | None:
     run = runs(protocol)[0]
     falls = motions(protocol, run)
     end = max((fall.end_s for fall in falls), default=0.0)
-    return drawing(protocol, run, falls, Indicators(), _FALLEN * end) if falls else None
+    return drawing(protocol, run, falls, (), _FALLEN * end) if falls else None
 
 
 def _describe_protocol(protocol: Protocol) -> Content:

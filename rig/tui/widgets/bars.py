@@ -8,7 +8,7 @@ from textual.content import Content
 from rig.tui.actions import BY_NAME, PAGES, Action, shown_key
 from rig.tui.model import UNDER_WAY, Model, alarm
 from rig.tui.next_step import next_step
-from rig.tui.widgets.text import Words, link_action, plain
+from rig.tui.widgets.text import link_action, plain
 
 LINKS = {"up": "● link up", "opening": "◌ opening", "down": "✗ link down", "closed": "○ no link"}
 TABS = {page: BY_NAME[f"page_{page}"].label for page, *_ in PAGES}
@@ -60,14 +60,10 @@ def headline(model: Model, width: int) -> Content:
     )
 
 
-class StopLine(Words):
-    """The STOP bar, also for the mouse, with the present activity."""
-
-    def show(self, model: Model, keys: Mapping[str, str]) -> None:
-        """Draw the present state."""
-        self.set_class(model.hot, "-hot")
-        stop = Content(f" ■ STOP  {shown_key(keys['stop'])} or Esc ")
-        self.say(link_action(stop, "app.do('stop')"), f"  {_doing(model)}")
+def stop_line(model: Model, keys: Mapping[str, str]) -> Content:
+    """Return the STOP bar, also for the mouse, with the present activity."""
+    stop = Content(f" ■ STOP  {shown_key(keys['stop'])} or Esc ")
+    return Content.assemble(link_action(stop, "app.do('stop')"), f"  {_doing(model)}")
 
 
 def hints(

@@ -15,7 +15,6 @@ from textual.widget import Widget
 from textual.widgets import Input, OptionList
 from textual.widgets.option_list import Option
 
-from rig.tui.widgets.bars import StopLine
 from rig.tui.widgets.text import Words
 
 _ARROWS: list[BindingType] = [("up", "move(-1)"), ("down", "move(1)")]
@@ -33,14 +32,13 @@ class Dialog(ModalScreen[Any]):
     """
 
     def __init__(self, *parts: Widget, keys: str = " ", large: bool = False) -> None:
-        super().__init__()
+        super().__init__(classes="-large" * large)
         self._parts = [*parts, Words((keys, "bold $primary"), id="how")]
-        self._large = large
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="-large" * self._large):
+        with Vertical():
             yield from self._parts
-        yield StopLine()
+        yield Words(id="stop")
 
     def dismiss(self, result: Any = None) -> AwaitComplete:
         """Close with an answer, once: keys in quick succession may repeat it."""
