@@ -20,7 +20,7 @@ from rig.campaign.machine import BEFORE_RELEASE, Flow, Stage
 from rig.errors import RigError
 from rig.text_rows import read_rows
 from rig.tui import commands
-from rig.tui.actions import BY_NAME, NEEDS_RIG, PAGES, Action
+from rig.tui.actions import BY_NAME, PAGES
 from rig.tui.ascii import AsciiFilter
 from rig.tui.client import ReconnectingClient
 from rig.tui.context import Options
@@ -195,7 +195,7 @@ class RigApp(App[None], inherit_bindings=False):
             "tabs": tabs(model.page, self.keys),
             "problem": wrong,
             "told": plain(self._told, 240) if is_told and not wrong else "",
-            "hints": hints(model, self.keys, width, self.possible),
+            "hints": hints(model, self.keys, width),
             "stop": stop_line(model, self.keys),
         }
         for screen in self.screen_stack:
@@ -371,18 +371,10 @@ class RigApp(App[None], inherit_bindings=False):
     def action_do(self, name: str) -> None:
         """Do an action of the table, if it is possible now."""
         action = BY_NAME[name]
-        if self.possible(action):
+        if self.model.allows(action):
             self.begin(commands.DO[name](self))
         elif action.driving and not self.client.driving and not self.options.offline:
             self.driver.take(campaign.EffectFailure(self.model.flow.ticket, _WATCHING))
-
-    def possible(self, action: Action) -> bool:
-        """Whether an action is possible now."""
-        has_rig = not self.options.offline or action.name not in NEEDS_RIG
-        # Without a rig, an operator may start with a new one.
-        begins = action.name == "go_on" and self.model.flow.stage is Stage.PROTOCOL
-        is_held = self.client.driving or begins or not action.driving
-        return has_rig and is_held and self.model.flow.stage in action.stages
 
     def action_choose(self, at: int) -> None:
         """Select a row of the home page."""

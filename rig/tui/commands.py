@@ -287,7 +287,7 @@ def _begin_check(app: RigApp) -> None:
 
 def _palette(app: RigApp) -> None:
     """Search the actions that are possible now."""
-    possible = filter(app.possible, ACTIONS)
+    possible = filter(app.model.allows, ACTIONS)
     actions = [action for action in possible if action.name != "palette"]
     lines = [f"{shown_key(app.keys[action.name]):8}{action.text}" for action in actions]
     question = Ask("Search commands", choices=lines, yes="run", chosen=0)

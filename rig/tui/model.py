@@ -13,6 +13,7 @@ from rig.protocol.protocol import Protocol, Run
 from rig.reasons import Reason
 from rig.recorder.run_lines import RunLine
 from rig.records import Job
+from rig.tui.actions import NEEDS_RIG, Action
 from rig.tui.client import ReconnectingClient
 from rig.tui.indicators import Indicators
 from rig.tui.state import DaemonState
@@ -80,6 +81,14 @@ class Model:
     unreadable: str = ""
     stop: StopAnswer | None = None
     page: str = ""
+
+    def allows(self, action: Action) -> bool:
+        """Whether an action is possible now."""
+        has_rig = not self.offline or action.name not in NEEDS_RIG
+        # Without a rig, an operator may start with a new one.
+        begins = action.name == "go_on" and self.flow.stage is Stage.PROTOCOL
+        is_held = self.client.driving or begins or not action.driving
+        return has_rig and is_held and self.flow.stage in action.stages
 
     @property
     def protocol(self) -> Protocol | None:

@@ -76,7 +76,7 @@ def test_enter_is_not_offered_before_the_verdict_is_kept():
 
 
 def keys_of(shown, width=80):
-    return hints(replace(shown, page="result"), KEYS, width, lambda _: True).plain
+    return hints(replace(shown, page="result"), KEYS, width).plain
 
 
 @pytest.mark.parametrize("width", [20, 40, 78, 198])

@@ -1,11 +1,11 @@
 """Lines above and below every page: title, tabs, problems, possible keys, and STOP."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from time import monotonic
 
 from textual.content import Content
 
-from rig.tui.actions import BY_NAME, PAGES, Action, shown_key
+from rig.tui.actions import BY_NAME, PAGES, shown_key
 from rig.tui.model import UNDER_WAY, Model, alarm
 from rig.tui.next_step import next_step
 from rig.tui.widgets.text import link_action, plain
@@ -66,9 +66,7 @@ def stop_line(model: Model, keys: Mapping[str, str]) -> Content:
     return Content.assemble(link_action(stop, "app.do('stop')"), f"  {_doing(model)}")
 
 
-def hints(
-    model: Model, keys: Mapping[str, str], width: int, possible: Callable[[Action], bool]
-) -> Content:
+def hints(model: Model, keys: Mapping[str, str], width: int) -> Content:
     """Return the most important keys now; all others are in the palette."""
     labels = {name: action.label for name, action in BY_NAME.items()}
     labels["go_on"] = next_step(model).enter
@@ -77,7 +75,7 @@ def hints(
     if model.flow.verdict == "rejected":
         labels["reject"] = "undo rejection"
     names = dict.fromkeys((*_OF_PAGE.get(model.page, ()), *_ANYWHERE))
-    useful = [name for name in names if labels[name] and possible(BY_NAME[name])]
+    useful = [name for name in names if labels[name] and model.allows(BY_NAME[name])]
     line = Content("")
     for name in (*useful[: KEYS_SHOWN - 1], "palette"):
         hint = Content.assemble((shown_key(keys[name]), "bold $primary"), f" {labels[name]}")
