@@ -22,7 +22,7 @@ from rig.tui.context import Options
 from rig.tui.keys import read_keys
 from rig.tui.replay import Player
 from rig.tui.state import DaemonState, state_of
-from rig.tui.widgets.figure import PAUSE_S
+from rig.tui.widgets.spans import PAUSE_S
 
 if TYPE_CHECKING:
     from argparse import Namespace

@@ -171,8 +171,7 @@ class RigApp(App[None], inherit_bindings=False):
             self.begin(self._look_around())
         if self.client.changed and not self.options.offline:
             self.client.changed = False
-            reopens = self.driver.asked is not None
-            for event in self.follower.absorb(reopens=reopens):
+            for event in [*self.follower.absorb(reopens=self.driver.asked is not None)]:
                 self.driver.take(event)
         if self.model.hot:
             while len(self.screen_stack) > 1:
@@ -272,11 +271,11 @@ class RigApp(App[None], inherit_bindings=False):
             self.action_do("go_on")
         self.desk.opens_first = False
 
-    def ask(self, question: Dialog, act: Callable[[Any], commands.Work] | None = None) -> None:
+    def ask(self, question: Dialog, act: Callable[[Any], commands.Work] = lambda _: None) -> None:
         """Open a dialog, and act on the answer; no dialog opens while a chain may fall."""
 
         def act_on_answer(answer: Any) -> None:
-            if act is not None and answer is not None:
+            if answer is not None:
                 self.begin(act(answer))
 
         if not self.model.hot:

@@ -78,8 +78,8 @@ class Follower:
         self._path, model = path, self._model
         model.live, model.view, model.voids, model.indicators = None, None, Voids(), Indicators()
 
-    def absorb(self, *, reopens: bool) -> list[Event]:
-        """Take over the daemon's present state, and return events for its changes.
+    def absorb(self, *, reopens: bool) -> Iterator[Event]:
+        """Take over the daemon's present state, and yield events for its changes.
 
         Parameters
         ----------
@@ -90,21 +90,22 @@ class Follower:
         state = self._model.state = client.state
         self._look_at_gates(state)
         if not client.up:
-            return [campaign.Lost(_UNHEARD if stage in BEFORE_RELEASE else _UNSEEN)]
-        events: list[Event] = [*_back(client, state), *_broken(stage, state)]
+            yield campaign.Lost(_UNHEARD if stage in BEFORE_RELEASE else _UNSEEN)
+            return
+        yield from _back(client, state)
+        yield from _broken(stage, state)
         session = state.section("session")
         if session:
             self._look_at_session(session, state)
-            events.append(campaign.SessionOpen())
+            yield campaign.SessionOpen()
         elif before.section("session") and not reopens:
             self._forget()
-            events.append(campaign.SessionClose())
+            yield campaign.SessionClose()
         if not client.driving and stage not in {Stage.LIVE, Stage.JUDGING}:
-            events.append(campaign.Lost(_TAKEN))
+            yield campaign.Lost(_TAKEN)
         missed = job_to_judge(state.runs)
         if missed and missed not in self.judged and client.driving:
-            events.append(campaign.Found(missed))
-        return events
+            yield campaign.Found(missed)
 
     def _look_at_gates(self, state: DaemonState) -> None:
         model, now = self._model, monotonic()
@@ -183,18 +184,15 @@ def open_live(path: Path) -> LiveAnalysis:
 
 def _back(client: ReconnectingClient, state: DaemonState) -> Iterator[Event]:
     """Yield the event for a port that is back, as its loss may have been too short to be seen."""
-    if state.link != "up" or state.section("error"):  # back, but still being checked
-        return
-    lost, client.lost = client.lost, {}
-    if lost:
+    # With an error it is back, but still being checked.
+    if client.lost and state.link == "up" and not state.section("error"):
+        lost, client.lost = client.lost, {}
         yield campaign.Notice(f"the port was lost and is back: {lost['message']}\n{lost['hint']}")
 
 
 def _broken(stage: Stage, state: DaemonState) -> Iterator[Event]:
     """Yield the event that an armed or arming drop has failed, as no answer will follow."""
-    if stage not in BEFORE_RELEASE:
-        return
-    if state.link == "down":
+    if stage in BEFORE_RELEASE and state.link == "down":
         yield campaign.Lost(_UNPLUGGED)
     drop = state.section("drop")
     if stage is Stage.COUNTDOWN and drop.get("state") == "interrupted":

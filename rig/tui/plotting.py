@@ -116,16 +116,16 @@ def axis_over(low: float, high: float, cells: int, least: int, *, whole: bool = 
 
 
 def draw_picture(
-    picture: Picture, width: int, height: int, moment: float | None = None
+    picture: Picture, moment: float | None, width: int, height: int
 ) -> list[list[Span]]:
     """Return a drawn picture, a list of spans for each line.
 
     Parameters
     ----------
-    width, height
-        Size in characters.
     moment
         Time of a vertical line, s; `None` for no line.
+    width, height
+        Size in characters.
     """
     panel, *residuals = panels = picture[: 1 + (height >= _STRIP_FROM)]
     strip = max(_STRIP_LEAST, height // _STRIP_OF) * len(residuals)

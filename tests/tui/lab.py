@@ -289,7 +289,7 @@ def unseen(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def draw_without_pause(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have figures drawn as soon as their data are there, and looked at as soon."""
-    for module in ("rig.tui.widgets.figure", "bench.pictures"):
+    for module in ("rig.tui.widgets.spans", "bench.pictures"):
         monkeypatch.setattr(f"{module}.PAUSE_S", 0.05)
 
 

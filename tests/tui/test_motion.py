@@ -70,7 +70,7 @@ WIDTH, HEIGHT = 44, 20
 
 def drawn(*traces):
     panel = Panel(PlotAxis("time (s)"), PlotAxis("z\n(cm)"), traces)
-    return draw_picture((panel,), WIDTH, HEIGHT)
+    return draw_picture((panel,), None, WIDTH, HEIGHT)
 
 
 def drawn_dots(plot, color=None):

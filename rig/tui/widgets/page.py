@@ -7,8 +7,8 @@ from textual.containers import Grid, Horizontal, Vertical, VerticalScroll
 from textual.widgets import Digits
 
 from rig.tui.desk import Desk, Face
+from rig.tui.plotting import draw_picture
 from rig.tui.scale import paint
-from rig.tui.widgets.figure import Figure
 from rig.tui.widgets.spans import SpanView
 from rig.tui.widgets.text import Words
 
@@ -26,9 +26,9 @@ class Page(Vertical):
         with Horizontal(id="parts"):
             with VerticalScroll(id="menu", can_focus=False):
                 yield Words(id="list")
-            yield SpanView(id="drawing")
+            yield SpanView(paint, slow=False, id="drawing")
             with Grid(id="plots"):
-                yield from (Figure() for _ in range(_FIGURES))
+                yield from (SpanView(draw_picture, slow=True) for _ in range(_FIGURES))
             with VerticalScroll(id="tables", can_focus=False):
                 yield Words(id="words")
         yield Words(id="foot")
@@ -62,16 +62,17 @@ class Page(Vertical):
         for part in there:
             self.query_one(f"#{part}").display = part in shown
         if face.drawing is not None and "drawing" in shown:
-            view = self.query_one("#drawing", SpanView)
-            seen = face.drawing, view.size.width or 38, view.size.height or 16
-            view.take(desk.latest("painted", seen, lambda: paint(*seen)))
+            self.query_one("#drawing", SpanView).show(face.drawing)
         pairs = 2 if columns >= _WIDE and lines >= 40 else 1
         most = face.beside * pairs if columns >= _NORMAL else 1
         turn = desk.chart % max(1, len(face.pictures)) if face.beside == 1 else 0
         pictures = [*face.pictures[turn:], *face.pictures[:turn]][: most * ("plots" in shown)]
         self.query_one("#plots").set_class(most > 1 and face.beside > 1, "-pairs")
-        for figure, picture in zip(self.query(Figure), chain(pictures, repeat(())), strict=False):
-            figure.show(picture, face.moment)
+        figures = self.query("#plots SpanView").results(SpanView)
+        for figure, picture in zip(figures, chain(pictures, repeat(())), strict=False):
+            figure.display = bool(picture)
+            if picture:
+                figure.show(picture, face.moment)
 
     def rewind(self) -> None:
         """Scroll to the beginning."""
