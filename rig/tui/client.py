@@ -60,7 +60,7 @@ class ReconnectingClient:
         self, url: str, socket: Path | None, connected: Callable[[], Coroutine[Any, Any, None]]
     ) -> None:
         self.url = url
-        self.path = self._usual_path = default_socket() if socket is None else socket
+        self.path = self._usual_path = socket or default_socket()
         self.name = f"rig tui {os.getpid()}"
         self.silence = "connecting"
         self.changed = True

@@ -67,9 +67,7 @@ def _go_on(app: RigApp) -> Work:
 def _open(app: RigApp, row: Beginning) -> Work:
     """Open an experiment with the connected rig, or in simulation without a rig."""
     client = app.client
-    if row.file is None:
-        return None
-    if app.desk.reading(row.file).problem:
+    if row.file is None or app.desk.reading(row.file).problem:
         app.tell("mend the file in an editor; it is read again by itself")
         return None
     session = row.session or app.options.session
@@ -129,10 +127,9 @@ _BEGIN: dict[str, Callable[[RigApp, Beginning], Work]] = {
 
 def _control(app: RigApp) -> Work:
     """Take control, or ask whether to give it back."""
-    client = app.client
-    if not client.driving:
-        return client.take_control()
-    _confirm(app, "control", client.release_control)
+    if not app.client.driving:
+        return app.client.take_control()
+    _confirm(app, "control", app.client.release_control)
     return None
 
 

@@ -9,9 +9,9 @@ from textual.content import Content
 
 from rig.analysis.result import GOOD
 from rig.campaign.machine import Stage
-from rig.protocol.protocol import Run
 from rig.reasons import notes_in, remedies
 from rig.records import Job
+from rig.results.whole import last_entries
 from rig.tui.desk import Desk, Face
 from rig.tui.drop_words import LOOKS, expected_words, headline, number_table, past_runs, sentence
 from rig.tui.model import Model
@@ -47,7 +47,7 @@ def face(model: Model, desk: Desk) -> Face:
     facts = f"drop   {height}\nmodel  {expected}\n"
     gates = board(protocol, model.indicators, desk.width)
     return Face(
-        Content("\n").join([steps(model), _headline(model, run), _action(model)]),
+        Content("\n").join([steps(model), *_headline(model), _action(model)]),
         rig,
         desk.latest("pictures", (protocol, run), lambda: fall_pictures(falls)),
         words=Content("\n").join([Content(facts), *gates]),
@@ -82,9 +82,11 @@ def steps(model: Model) -> Content:
     return Content(" · ").join(parts)
 
 
-def _headline(model: Model, run: Run) -> Content:
-    attempt = model.job.attempt if model.job else 1
-    return Content.styled(headline(run, len(model.state.runs) or 1, attempt), "bold $primary")
+def _headline(model: Model) -> list[Content]:
+    """Return the headline of the present run, if there is any."""
+    run, job = model.run, model.job
+    text = headline(run, len(model.state.runs) or 1, job.attempt) if run and job else ""
+    return [Content.styled(text, "bold $primary")] * bool(text)
 
 
 def _action(model: Model) -> Content:
@@ -118,9 +120,7 @@ def _result(model: Model, desk: Desk) -> Face:
     """Return the result of the latest drop, first in slow motion, or of a drop of the history."""
     view, job = desk.drop(model)
     own = model.page != "history"
-    parts = [verdict_words(model)] if own else []
-    if own and model.run is not None:
-        parts.insert(0, _headline(model, model.run))
+    parts = [*_headline(model), verdict_words(model)] if own else []
     if own and model.stage in {Stage.RESULT, Stage.HALTED}:
         parts = [steps(model), *parts, _action(model)]
     if view is None or job is None:
@@ -135,10 +135,8 @@ def _result(model: Model, desk: Desk) -> Face:
     falls = desk.latest(
         "moment", (view.path, job, hz), lambda: motions(view.protocol, run, recorded)
     )
-    key = view.path, view.reading, job, desk.width
-    pictures = desk.latest(
-        "figures", key[:3], lambda: drop_pictures(view, job) or fall_pictures(falls)
-    )
+    key = view.path, view.reading, job
+    pictures = desk.latest("figures", key, lambda: drop_pictures(view, job) or fall_pictures(falls))
     words = desk.latest("words", key, lambda: Content(number_table(view, job)))
     time_s = player.time_s if begun else seen[-1].tick / hz if seen else 0.0
     gates = board(view.protocol, indicators, desk.width)
@@ -159,7 +157,8 @@ def _which(view: SessionView, job: Job, player: Player) -> list[Content]:
     verdict, run = view.results[job].verdict, view.plan[job.run]
     what = f"{run.set_up} {f'impact {run.impact}' if run.impact else run.free}".strip()
     state = "▶ playing" if player.playing else "‖ paused"
-    logged = (line.reasons for line in reversed(view.states) if (line.run, line.attempt) == job)
+    logged = last_entries(view.states).get(job)
+    said = notes_in(logged.reasons) if logged else []
     return [
         Content.assemble(
             (f"drop {view.jobs.index(job) + 1} of {len(view.jobs)}", "bold $primary"),
@@ -170,5 +169,5 @@ def _which(view: SessionView, job: Job, player: Player) -> list[Content]:
             f"{state} at {player.speed:.3g} × real speed, t = {player.time_s * 1e3:.0f} ms · "
             f"{plain(view.path.name, 60)}{'  ▲ SIMULATED' * view.simulated}"
         ),
-        *(Content(f"note: {plain(text, 160)}") for text in notes_in(next(logged, ()))),
+        *(Content(f"note: {plain(text, 160)}") for text in said),
     ]

@@ -47,9 +47,7 @@ def headline(model: Model, width: int) -> Content:
     stamp = " ▲ SIMULATED " * model.simulated
     blind = " BLIND " * model.blind
     name = TABS.get(model.page, model.page).upper()
-    title = model.state.section("session").get("title") or (
-        model.protocol.title if model.protocol else "chainrig"
-    )
+    title = model.state.section("session").get("title") or "chainrig"
     room = width - len(name) - len(stamp) - len(blind) - len(right_side) - 3
     return Content.assemble(
         (f"{name}  ", "bold $primary"),
