@@ -45,13 +45,13 @@ class Drawing(NamedTuple):
     `middles` are those of the sides; `apart_m` is Δz if measured so far.
     """
 
-    strokes: tuple[Stroke, ...]
+    strokes: Sequence[Stroke]
     width_m: float
     bottom_m: float
     top_m: float
     apart_m: float | None = None
-    lamps: tuple[Lamp, ...] = ()
-    middles: tuple[float, ...] = ()
+    lamps: Sequence[Lamp] = ()
+    middles: Sequence[float] = ()
 
 
 def drawing(
@@ -105,7 +105,7 @@ def drawing(
         at, apart_m = 2.2 * pitch, tops[1] - tops[0]
         strokes.append((at, tops[0], at, tops[1], "success"))
         strokes += [(at - 0.03, z, at + 0.03, z, "success") for z in tops]
-    return Drawing(tuple(strokes), width, bottom, top, apart_m, tuple(lamps), tuple(middles))
+    return Drawing(strokes, width, bottom, top, apart_m, lamps, middles)
 
 
 def paint(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
@@ -145,11 +145,9 @@ def _rods(
     half = 0.5 * (rods.rod_length or _WIDTH_M)
     if protocol.vocabulary.part == "object":
         radius = max(0.5 * rods.widths[0], _BALL * shown_m)
-        around = [
-            (x + radius * math.cos(angle), height + radius * math.sin(angle))
-            for angle in np.linspace(0.0, 2.0 * math.pi, _CORNERS)
-        ]
-        yield from ((*start, *end, color) for start, end in pairwise(around))
+        angles = np.linspace(0.0, 2.0 * math.pi, _CORNERS)
+        around = np.column_stack([x + radius * np.cos(angles), height + radius * np.sin(angles)])
+        yield from ((*start, *end, color) for start, end in pairwise(around.tolist()))
         return
     lies = fall.role == "impact" and protocol.surface is not None
     for number, place in enumerate(rods.chain.heights):

@@ -40,13 +40,11 @@ def _drop_tables(analysis: Analysis) -> Content:
 
 
 def _progress(model: Model) -> Content:
-    if model.loading:
-        return Content(model.loading)
     runs = model.state.runs
+    if model.loading or not runs:
+        return Content(model.loading or "No session is open.")
     voids = model.voids.counts(runs)
     over = sum(done(line, voids.get(line.run, 0)) for line in runs)
-    if not runs:
-        return Content("No session is open.")
     pace = model.view.pace_s if model.view else None
     left_s = (pace or 0.0) * (len(runs) - over)
     remaining = f" · about {duration(left_s)} left" * bool(left_s)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
-from textual import events, on
+from textual import events
 from textual.app import ComposeResult
 from textual.await_complete import AwaitComplete
 from textual.binding import BindingType
@@ -128,8 +128,8 @@ class Ask(Dialog):
             if not query or matcher.match(choice)
         )
 
-    @on(Input.Changed)
-    def _filter_choices(self, event: Input.Changed) -> None:
+    def on_input_changed(self, event: Input.Changed) -> None:
+        """Show the choices that match."""
         if not self._free:
             self._fill(event.value)
             self._list.action_first()
@@ -140,15 +140,14 @@ class Ask(Dialog):
         if self._free and self._list.highlighted is not None:
             self.query_one(Input).value = self._choices[self._list.highlighted]
 
-    @on(OptionList.OptionSelected)
-    def _take_choice(self, event: OptionList.OptionSelected) -> None:
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """Take a choice that was clicked."""
         if self._free:
             self.query_one(Input).value = self._choices[event.option_index]
         else:
-            self.action_say()
+            self.on_input_submitted()
 
-    @on(Input.Submitted)
-    def action_say(self) -> None:
+    def on_input_submitted(self) -> None:
         """Answer with the text, or the number of the choice."""
         typed, option = self.query_one(Input).value, self._list.highlighted_option
         if not self._free:
