@@ -240,7 +240,6 @@ class RigApp(App[None], inherit_bindings=False):
             loaded = await asyncio.to_thread(import_module, f"rig.tui.pages.{module}")
             self._faces[page] = loaded.face
             self.draw()
-        await asyncio.to_thread(import_module, "rig.results.live")
         self._loaded()
 
     @property

@@ -1,22 +1,17 @@
 """A drop in words: its run, and its results with the model and free fall for comparison."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from rig.measurands import SEPARATION, averaged
 from rig.predictions import predicted_run
 from rig.printable import one_line
+from rig.protocol.protocol import Protocol, Run
 from rig.records import Job
 from rig.report.numbers import plus_minus
 from rig.report.parts import tables
+from rig.results.live import SessionView
 from rig.text_rows import read_rows
 from rig.text_table import text_table
-
-if TYPE_CHECKING:
-    from rig.protocol.protocol import Protocol, Run
-    from rig.results.live import SessionView
 
 LOOKS = {name: (sign, colour) for name, sign, colour in read_rows(__file__)}
 """Sign and colour of each verdict and state of a drop."""

@@ -1,20 +1,15 @@
 """Plots of the screens: figures of the report, and predictions of the next fall."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from rig.records import Job
 from rig.report.falls import fall_figures
 from rig.report.figure import Chart, Panel, PlotAxis, Trace
 from rig.report.figures import result_figure, runs_figure
 from rig.report.looks import MODEL, SECOND
+from rig.results.live import SessionView
 from rig.tui.motion import ChainFall
 from rig.tui.plotting import Picture
-
-if TYPE_CHECKING:
-    from rig.results.live import SessionView
 
 
 def pictures_of(*charts: Chart | None) -> list[Picture]:

@@ -1,9 +1,6 @@
 """Page of a drop, from the check of its gates to its result and replay: steps, rig, plot."""
 
-from __future__ import annotations
-
 from time import monotonic
-from typing import TYPE_CHECKING
 
 from textual.content import Content
 
@@ -11,6 +8,7 @@ from rig.analysis.result import GOOD
 from rig.campaign.machine import Stage
 from rig.reasons import notes_in, remedies
 from rig.records import Job
+from rig.results.live import SessionView
 from rig.results.whole import last_entries
 from rig.tui.desk import Desk, Face
 from rig.tui.drop_words import LOOKS, expected_words, headline, number_table, past_runs, sentence
@@ -22,9 +20,6 @@ from rig.tui.replay import Player, indicators_at, until
 from rig.tui.scale import Drawing, drawing
 from rig.tui.widgets.gates import board
 from rig.tui.widgets.text import plain
-
-if TYPE_CHECKING:
-    from rig.results.live import SessionView
 
 _DONE = dict.fromkeys((Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING, Stage.LIVE), 3)
 _DONE |= {Stage.SETTLING: 2, Stage.JUDGING: 4, Stage.RESULT: 5, Stage.HALTED: 5}

@@ -109,29 +109,23 @@ class Ask(Dialog):
         hint = "type to search" if not free else "type, or choose below with ↑ ↓" if choices else ""
         line = Input(text, max_length=200, select_on_focus=False, placeholder=hint)
         self._choices, self._free, self._first = choices, free, chosen
-        self._list = _Choices(markup=False)
+        self._list = _Choices(*self._matching(""), markup=False)
         keys = f"{'↑ ↓ ' * bool(choices)}Enter: {yes}   Esc: cancel"
         words = Words((question, "bold"), id="question")
         super().__init__(words, line, self._list, keys=keys, large=bool(choices))
 
     def on_mount(self) -> None:
-        self._fill("")
         self._list.highlighted = self._first
 
-    def _fill(self, query: str) -> None:
-        """List the matching choices."""
-        matcher = Matcher(query)
-        self._list.clear_options()
-        self._list.add_options(
-            Option(choice, str(at))
-            for at, choice in enumerate(self._choices)
-            if not query or matcher.match(choice)
-        )
+    def _matching(self, query: str) -> list[Option]:
+        """Return the choices that match, each with its number."""
+        matcher, choices = Matcher(query), enumerate(self._choices)
+        return [Option(text, str(at)) for at, text in choices if not query or matcher.match(text)]
 
     def on_input_changed(self, event: Input.Changed) -> None:
         """Show the choices that match."""
         if not self._free:
-            self._fill(event.value)
+            self._list.set_options(self._matching(event.value))
             self._list.action_first()
 
     def action_move(self, by: int) -> None:

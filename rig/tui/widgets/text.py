@@ -1,7 +1,5 @@
 """Sanitizing of foreign text for a terminal, and static text that is never parsed as markup."""
 
-from __future__ import annotations
-
 import re
 from typing import TypeAlias
 
@@ -52,7 +50,7 @@ def check_line(good: bool, text: str) -> Content:
     return Content.assemble(sign, text)
 
 
-Styled: TypeAlias = "str | tuple[str, str]"
+Styled: TypeAlias = str | tuple[str, str]
 """Text, or text with its style."""
 
 
