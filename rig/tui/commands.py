@@ -67,7 +67,7 @@ def _go_on(app: RigApp) -> Work:
 def _open(app: RigApp, row: Beginning) -> Work:
     """Open an experiment with the connected rig, or in simulation without a rig."""
     client = app.client
-    if row.file is None or app.desk.reading(row.file).problem:
+    if row.file is None or app.desk.reading(row.file)[1]:
         app.tell("mend the file in an editor; it is read again by itself")
         return None
     session = row.session or app.options.session

@@ -20,26 +20,21 @@ RESERVED = ("escape",)
 _HELD = {"ctrl", "shift", "alt"}
 
 
-def default_file() -> Path:
-    """Return the default path of the file."""
-    base = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
-    return Path(base) / "chainrig" / "keys.toml"
-
-
 def read_keys(path: Path | None = None) -> dict[str, str]:
     """Return the keys of every action, by name.
 
     Parameters
     ----------
     path
-        The file; by default `default_file`, which need not exist.
+        The file; by default that of the user's configuration, which need not exist.
 
     Raises
     ------
     InputError
         With every problem: unknown actions, keys given twice, no TOML.
     """
-    place = path or default_file()
+    base = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
+    place = path or Path(base) / "chainrig" / "keys.toml"
     if path is None and not place.is_file():
         return {action.name: action.keys for action in ACTIONS}
     try:

@@ -4,7 +4,6 @@ It needs more of the program than the first paint, so it is loaded when a survey
 """
 
 from collections.abc import Iterator
-from contextlib import suppress
 from functools import lru_cache
 from itertools import islice
 from pathlib import Path
@@ -98,11 +97,10 @@ def _boards() -> Iterator[Beginning]:
 
 def session_list(folder: Path) -> list[SessionEntry]:
     """Return the sessions of a folder, the newest first."""
-    dated = []
-    for path in folder.glob("*.session"):
-        with suppress(OSError):  # removed meanwhile
-            dated.append((path.stat().st_mtime_ns, path))
-    return [_look(path, file_stamp(path)) for _, path in sorted(dated, reverse=True)[:_MOST]]
+    stamps = ((file_stamp(path), path) for path in folder.glob("*.session"))
+    # A file that was removed meanwhile has none.
+    dated = sorted(((stamp[0][1], path, stamp) for stamp, path in stamps if stamp), reverse=True)
+    return [_look(path, stamp) for _, path, stamp in dated[:_MOST]]
 
 
 @lru_cache(maxsize=_MOST)  # the home page lists them repeatedly
