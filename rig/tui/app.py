@@ -361,8 +361,7 @@ class RigApp(App[None], inherit_bindings=False):
         if not self.client.driving:
             self.action_do("go_on")  # which shows the reason
         elif self._stillness.meant(self._face, at_s):
-            model = self.model
-            self.driver.take(campaign.GoOn(model.next_job, model.settle_s))
+            self.driver.take(campaign.GoOn(self.model.next_job, self.model.settle_s))
         else:
             self.driver.take(campaign.Notice(_NOT_MEANT))
 

@@ -91,11 +91,8 @@ class Sheet:
         cells = zip(self._bits[row].tolist(), self._inks[row].tolist(), strict=True)
         colors = *self._colors, ""
         # Every font has a blank.
-        letters = [
-            self._letters.get((row, column))
-            or Span(chr(BLANK + bits) if bits else " ", colors[ink])
-            for column, (bits, ink) in enumerate(cells)
-        ]
+        dots = (Span(chr(BLANK + bits) if bits else " ", colors[ink]) for bits, ink in cells)
+        letters = (self._letters.get((row, column), dot) for column, dot in enumerate(dots))
         runs = groupby(letters, key=itemgetter(1, 2))
         return [Span("".join(letter.text for letter in run), *look) for look, run in runs]
 

@@ -2,12 +2,12 @@
 
 import asyncio
 import os
-import subprocess
 import sys
 from collections.abc import Callable, Coroutine, Mapping
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
+from subprocess import DEVNULL, Popen
 from time import monotonic
 from typing import Any
 
@@ -71,7 +71,7 @@ class ReconnectingClient:
         self._hangs = False
         self._connected = connected
         self._client: AsyncClient | None = None
-        self.daemon: subprocess.Popen[bytes] | None = None
+        self.daemon: Popen[bytes] | None = None
         self._had_control = False
         self._wants_control = True
         self._started_at = -_START_S
@@ -247,13 +247,9 @@ class ReconnectingClient:
         # Its last messages would otherwise be lost with the terminal.
         with self.path.with_suffix(".log").open("ab") as log:
             command = [sys.executable, "-m", "rig", "daemon", "--port", self.url]
-            command += ["--idle-timeout", str(_IDLE_S)]
-            self.daemon = subprocess.Popen(
-                [*command, "--socket", str(self.path)],
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=log,
-                start_new_session=True,
+            command += ["--idle-timeout", str(_IDLE_S), "--socket", str(self.path)]
+            self.daemon = Popen(
+                command, stdin=DEVNULL, stdout=log, stderr=log, start_new_session=True
             )
         self.silence = "starting the daemon"
 

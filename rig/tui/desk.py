@@ -145,8 +145,7 @@ class Desk:
         if fresh and job not in {None, self.replayed}:
             self.replayed = job
             self.change(model, lambda _, end_s: Player(speed=end_s / REPLAY_S, playing=True))
-        if self.players[model.page].playing:
-            self.change(model, lambda player, end_s: player.advance(seconds, end_s))
+        self.change(model, lambda player, end_s: player.advance(seconds, end_s))
 
     def move(self, model: Model, by: int) -> None:
         """Select another drop of the history page, from its beginning."""

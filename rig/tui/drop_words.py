@@ -30,10 +30,10 @@ def headline(run: Run, total: int, attempt: int) -> str:
 def expected_words(protocol: Protocol, run: Run) -> str:
     """Return the model's prediction for a run in words; empty without a prediction."""
     expected = predicted_run(protocol, run)
-    values = [
-        f"{row.symbol} {plus_minus(expected[row.name], row.scale)} {row.unit}"
-        for row in averaged(expected)
-    ]
+    rows = averaged(expected)
+    values = (
+        f"{row.symbol} {plus_minus(expected[row.name], row.scale)} {row.unit}" for row in rows
+    )
     return "  ".join(values)
 
 

@@ -101,12 +101,12 @@ class Model:
         flow, job = self.flow, self.flow.job
         if flow.stage is not Stage.RESULT or job is None:
             return self.state.runs
-        return tuple(
-            line._replace(attempt=job.attempt, state=flow.verdict, reasons=flow.reasons)
-            if line.run == job.run
-            else line
-            for line in self.state.runs
-        )
+
+        def latest(line: RunLine) -> RunLine:
+            verdict = line._replace(attempt=job.attempt, state=flow.verdict, reasons=flow.reasons)
+            return verdict if line.run == job.run else line
+
+        return tuple(map(latest, self.state.runs))
 
     @property
     def next_job(self) -> Job | None:
