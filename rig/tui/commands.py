@@ -246,8 +246,7 @@ def _reject(app: RigApp) -> None:
     """Ask for the reason to reject a drop, or whether to undo a rejection."""
     model = app.model
     if model.flow.verdict == "rejected":
-        verdict, _ = model.flow.judged
-        _confirm(app, "undo", lambda: app.driver.take(Restore()), verdict=verdict)
+        _confirm(app, "undo", lambda: app.driver.take(Restore()), verdict=model.flow.judged[0])
         return
 
     question = "Why is this drop rejected?"
@@ -284,8 +283,7 @@ def _begin_check(app: RigApp) -> None:
 
 def _palette(app: RigApp) -> None:
     """Search the actions that are possible now."""
-    possible = filter(app.model.allows, ACTIONS)
-    actions = [action for action in possible if action.name != "palette"]
+    actions = [each for each in ACTIONS if each.name != "palette" and app.model.allows(each)]
     lines = [f"{shown_key(app.keys[action.name]):8}{action.text}" for action in actions]
     question = Ask("Search commands", choices=lines, yes="run", chosen=0)
     app.ask(question, lambda number: app.action_do(actions[number].name))

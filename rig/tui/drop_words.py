@@ -30,11 +30,8 @@ def headline(run: Run, total: int, attempt: int) -> str:
 def expected_words(protocol: Protocol, run: Run) -> str:
     """Return the model's prediction for a run in words; empty without a prediction."""
     expected = predicted_run(protocol, run)
-    rows = averaged(expected)
-    values = (
-        f"{row.symbol} {plus_minus(expected[row.name], row.scale)} {row.unit}" for row in rows
-    )
-    return "  ".join(values)
+    values = ((row, plus_minus(expected[row.name], row.scale)) for row in averaged(expected))
+    return "  ".join(f"{row.symbol} {value} {row.unit}" for row, value in values)
 
 
 def sentence(view: SessionView, job: Job) -> str:

@@ -22,6 +22,7 @@ from rig.tui.client import ReconnectingClient
 from rig.tui.context import Options
 from rig.usb.listing import serial_ports
 
+_BOARD = "Connect a board"
 _MOST = 200
 """Number of session files listed, the newest first."""
 
@@ -58,12 +59,9 @@ def look_around(options: Options, client: ReconnectingClient) -> list[Beginning]
         Beginning(section, kind, title, named.get(f"{name}.yaml"), value)
         for section, kind, name, value, title in read_rows(__file__)
     ]
-    boards = [*_boards()]
-    if client.in_the_way is not None:
-        title = f"end {client.in_the_way[0]}, which runs already"
-        boards.append(Beginning("Connect a board", "end", title))
+    boards = [*_boards(client)]
     if not boards and not client.port:
-        boards.append(Beginning("Connect a board", "board", "none is plugged in"))
+        boards.append(Beginning(_BOARD, "board", "none is plugged in"))
     sessions = session_list(Path())
     readable = [entry for entry in sessions if not entry.trouble] or sessions
     return [
@@ -85,14 +83,14 @@ def _unfinished(sessions: list[SessionEntry], named: dict[str, Path]) -> Iterato
             yield Beginning("Continue", "open", title, file, port, entry.path)
 
 
-def _boards() -> Iterator[Beginning]:
+def _boards(client: ReconnectingClient) -> Iterator[Beginning]:
     for _ in waiting_drives():
-        title = "Pico: put the firmware on it"
-        yield Beginning("Connect a board", "flash", title, value="pico")
+        yield Beginning(_BOARD, "flash", "Pico: put the firmware on it", value="pico")
     for port in serial_ports():
         if port.candidate:
-            title = f"{port.kind} at {port.path}"
-            yield Beginning("Connect a board", "board", title, value=port.path)
+            yield Beginning(_BOARD, "board", f"{port.kind} at {port.path}", value=port.path)
+    if client.in_the_way is not None:
+        yield Beginning(_BOARD, "end", f"end {client.in_the_way[0]}, which runs already")
 
 
 def session_list(folder: Path) -> list[SessionEntry]:

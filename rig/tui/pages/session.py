@@ -75,7 +75,7 @@ def _fit_words(model: Model) -> tuple[str, str]:
 
 def _marks(model: Model) -> Iterator[tuple[str, str]]:
     """Yield a symbol for each run in order; the present run in reverse colours."""
+    present = model.job.run if model.job else None
     for line in model.state.runs:
-        is_now = model.job is not None and line.run == model.job.run
         symbol, colour = LOOKS.get(line.state, ("?", "$foreground"))
-        yield symbol, f"{colour} reverse" if is_now else colour
+        yield symbol, f"{colour} reverse" if line.run == present else colour
