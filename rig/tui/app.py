@@ -53,11 +53,10 @@ _NOT_MEANT = (
 
 
 def _themes() -> Iterator[Theme]:
-    (_, *names), *rows = read_rows(__file__, "themes.txt", None)
-    for at, name in enumerate(names):
-        colours: dict[str, Any] = {part: values[at] for part, *values in rows}
-        border = colours.pop("border")
-        edges = {"border": border, "border-blurred": border}
+    (_, *parts), *columns = zip(*read_rows(__file__, "themes.txt", None), strict=True)
+    for name, *values in columns:
+        colours: dict[str, Any] = dict(zip(parts, values, strict=True))
+        edges = dict.fromkeys(("border", "border-blurred"), colours.pop("border"))
         yield Theme(name=f"rig-{name}", dark=name != "light", variables=edges, **colours)
 
 
@@ -173,9 +172,8 @@ class RigApp(App[None], inherit_bindings=False):
             self.client.changed = False
             for event in [*self.follower.absorb(reopens=self.driver.asked is not None)]:
                 self.driver.take(event)
-        if self.model.hot:
-            while len(self.screen_stack) > 1:
-                self.screen.dismiss(None)
+        while self.model.hot and len(self.screen_stack) > 1:
+            self.screen.dismiss(None)
         self._follow()
         self.draw()
 
@@ -272,13 +270,10 @@ class RigApp(App[None], inherit_bindings=False):
 
     def ask(self, question: Dialog, act: Callable[[Any], commands.Work] = lambda _: None) -> None:
         """Open a dialog, and act on the answer; no dialog opens while a chain may fall."""
-
-        def act_on_answer(answer: Any) -> None:
-            if answer is not None:
-                self.begin(act(answer))
-
         if not self.model.hot:
-            self.push_screen(question, act_on_answer)
+            self.push_screen(
+                question, lambda answer: self.begin(None if answer is None else act(answer))
+            )
             self.draw()
 
     def tell(self, text: str) -> None:

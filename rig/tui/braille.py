@@ -13,6 +13,7 @@ COLUMNS, ROWS = 2, 4
 """Dots of a character."""
 BLANK = 0x2800
 _BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
+_PLACES = {bit: (at % COLUMNS, at // COLUMNS) for at, bit in enumerate(_BITS.ravel().tolist())}
 
 
 class Span(NamedTuple):
@@ -100,8 +101,5 @@ class Sheet:
 def dots_of(letter: str) -> list[tuple[int, int]]:
     """Return the dots of a braille character, column before row; empty for other characters."""
     bits = ord(letter) - BLANK
-    if not 0 < bits < 1 << COLUMNS * ROWS:
-        return []
-    return [
-        (x, y) for y, row in enumerate(_BITS.tolist()) for x, bit in enumerate(row) if bits & bit
-    ]
+    is_braille = 0 <= bits < 1 << COLUMNS * ROWS
+    return [place for bit, place in _PLACES.items() if is_braille and bits & bit]

@@ -15,8 +15,6 @@ from rig.tui.actions import ACTIONS, BY_NAME
 ALWAYS = {"stop": "f9", "go_on": "enter"}
 """Keys that an action keeps in addition to the operator's own."""
 _HOW = 'write one line for each action, such as reject = "r"'
-RESERVED = ("escape",)
-"""Keys whose meaning is fixed."""
 _HELD = {"ctrl", "shift", "alt"}
 
 
@@ -88,7 +86,7 @@ def merge_keys(
             continue
         given[name] = [*keys, *{ALWAYS.get(name, keys[0])}.difference(keys)]
         for key in given[name]:
-            if key in RESERVED:
+            if key == "escape":
                 faults.append(f"{at}: {name}: {key} always means STOP")
             elif not _is_key(key):
                 examples = "r, f5, ctrl+r, enter, question_mark"
