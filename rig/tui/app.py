@@ -133,7 +133,6 @@ class RigApp(App[None], inherit_bindings=False):
             self.begin(self.follower.show_file(self.options.session))
         self._follow()
         self.set_timer(TICK_S, self._tick)
-        self.draw()
         self.call_after_refresh(lambda: self.begin(self._load_pages()))
 
     def on_unmount(self) -> None:
@@ -162,8 +161,7 @@ class RigApp(App[None], inherit_bindings=False):
         if not self._open():
             return
         self._stillness.alive(now)
-        if self.model.flow.stage is Stage.COUNTDOWN:
-            self.driver.take(campaign.Tick(min(passed, _COUNTED_S)))
+        self.driver.take(campaign.Tick(min(passed, _COUNTED_S)))
         self.desk.tick(self.model, passed)
         if self.model.flow.stage is Stage.PROTOCOL and now - self._looked_s >= _LOOK_S:
             self._looked_s = now

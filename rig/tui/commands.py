@@ -172,8 +172,7 @@ async def _sessions(app: RigApp) -> None:
     app.turn("history")
     whole = (at for at, entry in enumerate(entries) if not entry.trouble)
     title = f"Sessions in {plain(folder.resolve(), 80)}, newest first"
-    lines = [_session_line(entry) for entry in entries]
-    question = Ask(title, choices=lines, yes="play", chosen=next(whole, 0))
+    question = Ask(title, "", [*map(_session_line, entries)], yes="play", chosen=next(whole, 0))
     app.ask(question, lambda number: _look_at(app, entries[number]))
 
 

@@ -6,7 +6,6 @@ from typing import Any, ClassVar
 from textual import events
 from textual.app import ComposeResult
 from textual.await_complete import AwaitComplete
-from textual.binding import BindingType
 from textual.containers import Vertical, VerticalScroll
 from textual.content import Content
 from textual.fuzzy import Matcher
@@ -16,8 +15,6 @@ from textual.widgets import Input, OptionList
 from textual.widgets.option_list import Option
 
 from rig.tui.widgets.text import Words
-
-_ARROWS: list[BindingType] = [("up", "move(-1)"), ("down", "move(1)")]
 
 
 class Dialog(ModalScreen[Any]):
@@ -30,6 +27,8 @@ class Dialog(ModalScreen[Any]):
     keys
         Description of its keys.
     """
+
+    BINDINGS: ClassVar = [("up", "move(-1)"), ("down", "move(1)")]
 
     def __init__(self, *parts: Widget, keys: str = " ", large: bool = False) -> None:
         super().__init__(classes="-large" * large)
@@ -58,8 +57,6 @@ class Confirm(Dialog):
 
 class TextDialog(Dialog):
     """A long text; any key but the arrows closes it."""
-
-    BINDINGS: ClassVar = _ARROWS
 
     def __init__(self, text: Content) -> None:
         super().__init__(VerticalScroll(Words(text, id="table"), can_focus=False), large=True)
@@ -94,7 +91,7 @@ class Ask(Dialog):
         the number of a choice. If `None`, other (not empty) text may be typed.
     """
 
-    BINDINGS: ClassVar = [*_ARROWS, ("escape", "dismiss")]
+    BINDINGS: ClassVar = [("escape", "dismiss")]
 
     def __init__(
         self,
