@@ -82,7 +82,6 @@ def help_text(keys: Mapping[str, str], *, wide: bool) -> Content:
     lines: list[str] = []
     for head, actions in groupby(ACTIONS, attrgetter("group")):
         lines += ["", head]
-        for action in actions:
-            line = f"  {shown_key(keys[action.name]):8}{action.text:62}"
-            lines.append(line + action.command * wide)
+        for row in actions:
+            lines.append(f"  {shown_key(keys[row.name]):8}{row.text:62}{row.command * wide}")
     return Content(_HELP.format(table="\n".join(map(str.rstrip, lines))))

@@ -63,20 +63,17 @@ class ReconnectingClient:
         self.path = self._usual_path = socket or default_socket()
         self.name = f"rig tui {os.getpid()}"
         self.silence = "connecting"
-        self.changed = True
+        self.changed = self._wants_control = True
         self.lost: Mapping[str, Any] = {}
         self.in_the_way: tuple[str, int] | None = None
         self.disk_s = 0.0
         self.patience_s = _SILENT_S
-        self._hangs = False
+        self._hangs = self._had_control = self.is_trial = False
         self._connected = connected
         self._client: AsyncClient | None = None
         self.daemon: Popen[bytes] | None = None
-        self._had_control = False
-        self._wants_control = True
         self._started_at = -_START_S
         self._port = ""
-        self.is_trial = False
 
     @property
     def idle(self) -> bool:

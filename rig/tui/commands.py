@@ -216,8 +216,7 @@ def _write(app: RigApp, command: str, option: str, suffix: str) -> None:
         app.tell(app.model.loading or "no session is open: press o to choose one")
         return
     target = view.path.with_suffix(suffix)
-    write = partial(_run, app, command, view.path, option, target)
-    _confirm(app, "write", write, target=target)
+    _confirm(app, "write", lambda: _run(app, command, view.path, option, target), target=target)
 
 
 async def _run(app: RigApp, *command: str | Path, done: str = "") -> None:

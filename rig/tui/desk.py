@@ -149,6 +149,5 @@ class Desk:
 
     def move(self, model: Model, by: int) -> None:
         """Select another drop of the history page, from its beginning."""
-        view = self.view(model)
-        player = self.players["history"]
+        view, player = self.view(model), self.players["history"]
         self.players["history"] = player.other(by, len(view.jobs) if view else 1)

@@ -46,8 +46,7 @@ def link_action(content: Content, action: str) -> Content:
 
 def check_line(good: bool, text: str) -> Content:
     """Return text after a sign for good or bad."""
-    sign = ("✓ ", "bold $success") if good else ("✗ ", "bold $error")
-    return Content.assemble(sign, text)
+    return Content.assemble(("✓ ", "bold $success") if good else ("✗ ", "bold $error"), text)
 
 
 Styled: TypeAlias = str | tuple[str, str]
