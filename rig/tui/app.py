@@ -247,7 +247,8 @@ class RigApp(App[None], inherit_bindings=False):
         """Show a page, beginning with its first part."""
         self.model.page = page
         self.desk.part = self.desk.chart = 0
-        self.sheet.rewind()
+        if self._open():
+            self.sheet.rewind()
         self.draw()
 
     def turn_on(self, part: int = 0, chart: int = 0) -> None:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from itertools import groupby
 from operator import itemgetter
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,10 @@ class Span(NamedTuple):
     text: str
     color: str = ""
     bold: bool = False
+
+
+Rows: TypeAlias = list[list[Span]]
+"""Lines of characters from the top, each a list of spans."""
 
 
 class Sheet:
@@ -84,8 +88,8 @@ class Sheet:
         for place, letter in enumerate(span.text, start=column):
             self._letters[row, place] = span._replace(text=letter)
 
-    def rows(self) -> list[list[Span]]:
-        """Return the drawing, a list of spans for each line of characters."""
+    def rows(self) -> Rows:
+        """Return the drawing."""
         return list(map(self._row, range(self.height)))
 
     def _row(self, row: int) -> list[Span]:

@@ -37,7 +37,7 @@ _CLOCK_S = 3.0
 
 
 class Follower:
-    """Holds the latest state of rig and session.
+    """Keeps the model of the screens up to date with rig and session.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ import numpy as np
 
 from rig.arrays import Array
 from rig.report.looks import MODEL, MUTED, SECOND
-from rig.tui.braille import COLUMNS, ROWS, Sheet, Span
+from rig.tui.braille import COLUMNS, ROWS, Rows, Sheet, Span
 
 if TYPE_CHECKING:
     from rig.report.figure import Panel, PlotAxis, Trace
@@ -115,10 +115,8 @@ def axis_over(low: float, high: float, cells: int, least: int, *, whole: bool = 
     return min(fitting, key=lambda axis: (len(axis.ticks) < 3, axis.unit), default=bare)
 
 
-def draw_picture(
-    picture: Picture, moment: float | None, width: int, height: int
-) -> list[list[Span]]:
-    """Return a drawn picture, a list of spans for each line.
+def draw_picture(picture: Picture, moment: float | None, width: int, height: int) -> Rows:
+    """Return a drawn picture.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ import numpy as np
 
 from rig.protocol.contact import of_run
 from rig.protocol.protocol import Protocol, Run
-from rig.tui.braille import COLUMNS, ROWS, Sheet, Span
+from rig.tui.braille import COLUMNS, ROWS, Rows, Sheet, Span
 
 if TYPE_CHECKING:
     from rig.tui.motion import ChainFall
@@ -108,7 +108,7 @@ def drawing(
     return Drawing(strokes, width, bottom, top, apart_m, lamps, middles)
 
 
-def paint(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
+def paint(drawing: Drawing, width: int, height: int) -> Rows:
     """Return the drawing in columns and lines of characters, with words in the last line.
 
     Dots are square.

@@ -1,9 +1,9 @@
 """Widget for lines of coloured spans, without the wrapping and styling of other text."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 from time import monotonic
-from typing import Any, TypeAlias
+from typing import Any
 
 from rich.segment import Segment
 from rich.style import Style
@@ -11,9 +11,8 @@ from textual.geometry import Region
 from textual.strip import Strip
 from textual.widget import Widget
 
-from rig.tui.braille import Span
+from rig.tui.braille import Rows
 
-Rows: TypeAlias = Sequence[Sequence[Span]]
 PAUSE_S = 0.2
 """Least time between new pictures, s."""
 
@@ -34,7 +33,7 @@ class SpanView(Widget):
     def __init__(self, draw: Callable[..., Rows], *, slow: bool, **more: Any) -> None:
         super().__init__(**more)
         self._draw, self._slow = draw, slow
-        self._rows: Rows = ()
+        self._rows: Rows = []
         self._content: tuple[Any, ...] = ()
         self._at_s = -PAUSE_S
         self._plain = Style()
