@@ -22,7 +22,7 @@ from rig.tui.context import Options
 from rig.tui.keys import read_keys
 from rig.tui.replay import Player
 from rig.tui.state import DaemonState, state_of
-from rig.tui.widgets.figure import PAUSE_S
+from rig.tui.widgets.spans import PAUSE_S
 
 if TYPE_CHECKING:
     from argparse import Namespace
@@ -229,7 +229,7 @@ async def _looks(
     """Look at one moment in every size and theme."""
     client = FakeClient(shot.state)
     app = RigApp(options, keys, client)
-    app.driver.flow = shot.flow
+    app.model.flow = shot.flow
     app.desk.replayed = shot.flow.job  # its slow motion is over
     if shot.state.section("session"):
         app.follower.look_with(live)
@@ -242,11 +242,11 @@ async def _looks(
                 await pilot.pause(0.02)
 
         if shot.state.section("session"):
-            await until(lambda: app.follower.view is not None and app.follower.indicators.known)
+            await until(lambda: app.model.view is not None and app.model.indicators.known)
         if shot.page == "history":
             app.desk.players["history"] = Player(0, _REPLAYED_S)
             app.turn("history")
-        await until(lambda: app.page == shot.page and (app.follower.view or app.desk.rows))
+        await until(lambda: app.model.page == shot.page and (app.model.view or app.desk.rows))
         # All edges came at once, which looks like flicker for a while.
         await until(lambda: _all_counted(app, shot) and _quiet(app))
         for size in sizes:
@@ -262,14 +262,12 @@ def _as_svg(app: RigApp) -> str:
 
 
 def _all_counted(app: RigApp, shot: Screenshot) -> bool:
-    return len(shot.state.edges) <= sum(gate.edges for gate in app.follower.indicators.gates)
+    return len(shot.state.edges) <= sum(gate.edges for gate in app.model.indicators.gates)
 
 
 def _quiet(app: RigApp) -> bool:
     now = monotonic()
-    return all(
-        gate.steady(now) and not gate.flickers(now) for gate in app.follower.indicators.gates
-    )
+    return all(gate.steady(now) and not gate.flickers(now) for gate in app.model.indicators.gates)
 
 
 async def at_rest(app: RigApp, pilot: Pilot[None], look: Callable[[], str]) -> str:

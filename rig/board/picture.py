@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 
 from rig.protocol.protocol import Protocol, Run
-from rig.tui.indicators import Indicators
 from rig.tui.motion import ChainFall
 from rig.tui.scale import drawing
 
@@ -25,7 +24,7 @@ def moving_picture(protocol: Protocol, run: Run, falls: Sequence[ChainFall]) -> 
     fell = any(fall.times.size for fall in falls)
     end_s = max(fall.end_s for fall in falls) + _AFTER_S if fell else 0.0
     times = np.linspace(0.0, end_s, _MOMENTS if fell else 1)
-    first, *_ = drawings = [drawing(protocol, run, falls, Indicators(), time) for time in times]
+    first, *_ = drawings = [drawing(protocol, run, falls, (), time) for time in times]
     names = [protocol.vocabulary.body]
     if protocol.vocabulary.two_sides:
         names = [f"{run.impact} strikes", f"{run.free} falls freely"]

@@ -69,11 +69,6 @@ To change keys, write ~/.config/chainrig/keys.toml: reject = "r"
 ↑ ↓ scroll; any other key closes this page."""
 
 
-def possible(action: Action, stage: Stage, *, driving: bool) -> bool:
-    """Whether an action is possible in this stage."""
-    return stage in action.stages and (driving or not action.driving)
-
-
 def shown_key(keys: str) -> str:
     """Return the first key of an action as labelled on a keyboard."""
     first = keys.partition(",")[0]
@@ -87,7 +82,6 @@ def help_text(keys: Mapping[str, str], *, wide: bool) -> Content:
     lines: list[str] = []
     for head, actions in groupby(ACTIONS, attrgetter("group")):
         lines += ["", head]
-        for action in actions:
-            line = f"  {shown_key(keys[action.name]):8}{action.text:62}"
-            lines.append(line + action.command * wide)
+        for row in actions:
+            lines.append(f"  {shown_key(keys[row.name]):8}{row.text:62}{row.command * wide}")
     return Content(_HELP.format(table="\n".join(map(str.rstrip, lines))))

@@ -10,7 +10,7 @@ from typing import Any
 
 from textual import events
 from textual.app import App, ComposeResult
-from textual.css.query import NoMatches
+from textual.content import Content
 from textual.filter import LineFilter
 from textual.theme import Theme
 from textual.widgets import Input
@@ -20,7 +20,7 @@ from rig.campaign.machine import BEFORE_RELEASE, Flow, Stage
 from rig.errors import RigError
 from rig.text_rows import read_rows
 from rig.tui import commands
-from rig.tui.actions import BY_NAME, NEEDS_RIG, PAGES, Action, possible
+from rig.tui.actions import BY_NAME, PAGES
 from rig.tui.ascii import AsciiFilter
 from rig.tui.client import ReconnectingClient
 from rig.tui.context import Options
@@ -30,9 +30,10 @@ from rig.tui.follow import Follower
 from rig.tui.model import Model
 from rig.tui.stillness import Stillness
 from rig.tui.terminal import Terminal
-from rig.tui.widgets.bars import StatusBar, StopBar, StopLine
-from rig.tui.widgets.dialogs import Ask, Confirm, Dialog
+from rig.tui.widgets.bars import headline, hints, problem, stop_line, tabs
+from rig.tui.widgets.dialogs import Ask, Confirm, Dialog, TextDialog
 from rig.tui.widgets.page import Page
+from rig.tui.widgets.text import Words, plain
 
 TICK_S = 0.1
 _LEAST_S = 0.01  # least time between ticks, after a late tick
@@ -52,11 +53,10 @@ _NOT_MEANT = (
 
 
 def _themes() -> Iterator[Theme]:
-    (_, *names), *rows = read_rows(__file__, "themes.txt", None)
-    for at, name in enumerate(names):
-        colours: dict[str, Any] = {part: values[at] for part, *values in rows}
-        border = colours.pop("border")
-        edges = {"border": border, "border-blurred": border}
+    (_, *parts), *columns = zip(*read_rows(__file__, "themes.txt", None), strict=True)
+    for name, *values in columns:
+        colours: dict[str, Any] = dict(zip(parts, values, strict=True))
+        edges = dict.fromkeys(("border", "border-blurred"), colours.pop("border"))
         yield Theme(name=f"rig-{name}", dark=name != "light", variables=edges, **colours)
 
 
@@ -88,23 +88,22 @@ class RigApp(App[None], inherit_bindings=False):
         options: Options,
         keys: Mapping[str, str],
         client: ReconnectingClient | None = None,
-        loaded: Callable[[], object] | None = None,
+        loaded: Callable[[], object] = lambda: None,
     ) -> None:
         super().__init__(driver_class=Terminal)
         self.options = options
         self.keys: Mapping[str, str] = keys
         self.action_of = {key: name for name, text in keys.items() for key in text.split(",")}
-        self.page: str = ""
         # Offline it is never connected.
         self.client = client or ReconnectingClient(options.port, options.socket, self._resume)
         self._loaded = loaded
-        self.follower = Follower(self.client, self.begin)
         start = Stage.DONE if options.offline else Stage.PROTOCOL
         flow = Flow(stage=start, countdown_s=options.countdown_s)
-        self.driver: Driver = Driver(flow, self.client, self.follower, self.begin)
+        self.model = Model(self.client, flow, options.offline)
+        self.follower = Follower(self.model, self.begin)
+        self.driver: Driver = Driver(self.model, self.follower, self.begin)
         self.desk = Desk(options)
-        self._faces: dict[str, Callable[[Model, Desk, int], Face]] = {}
-        self._drawn = ""
+        self._faces: dict[str, Callable[[Model, Desk], Face]] = {}
         self._looked_s = 0.0
         self._stillness = Stillness(options.still_s)
         self._last = self._due = monotonic()
@@ -118,25 +117,22 @@ class RigApp(App[None], inherit_bindings=False):
 
     def get_line_filters(self) -> Sequence[LineFilter]:
         """Return the filters applied to every line drawn."""
-        if not self.options.ascii:
-            return super().get_line_filters()
-        return (*super().get_line_filters(), AsciiFilter())
+        return [*super().get_line_filters(), *[AsciiFilter()] * self.options.ascii]
 
     # ------------------------------------------------------------------ life
 
     def compose(self) -> ComposeResult:
-        yield StatusBar()
+        yield from (Words(id=name) for name in ("headline", "tabs", "problem", "told"))
         yield Page()
-        yield StopBar()
+        yield from (Words(id=name) for name in ("hints", "stop"))
 
     async def on_mount(self) -> None:
         if not self.options.offline:
             self.run_worker(self.client.keep(), group="client")
         elif self.options.session is not None:
-            self.follower.look_at(self.options.session)
+            self.begin(self.follower.show_file(self.options.session))
         self._follow()
         self.set_timer(TICK_S, self._tick)
-        self.draw()
         self.call_after_refresh(lambda: self.begin(self._load_pages()))
 
     def on_unmount(self) -> None:
@@ -151,7 +147,7 @@ class RigApp(App[None], inherit_bindings=False):
         try:
             await work
         except RigError as error:
-            self.driver.refuse(error)
+            self.driver.take(campaign.effect_failure(self.model.flow.ticket, error))
 
     async def _tick(self) -> None:
         # Ten times a second, or down to five if that takes too much processor time for long.
@@ -165,20 +161,17 @@ class RigApp(App[None], inherit_bindings=False):
         if not self._open():
             return
         self._stillness.alive(now)
-        if self.flow.stage is Stage.COUNTDOWN:
-            self.driver.take(campaign.Tick(min(passed, _COUNTED_S)))
+        self.driver.take(campaign.Tick(min(passed, _COUNTED_S)))
         self.desk.tick(self.model, passed)
-        if self.flow.stage is Stage.PROTOCOL and now - self._looked_s >= _LOOK_S:
+        if self.model.flow.stage is Stage.PROTOCOL and now - self._looked_s >= _LOOK_S:
             self._looked_s = now
             self.begin(self._look_around())
         if self.client.changed and not self.options.offline:
             self.client.changed = False
-            reopens = self.driver.asked is not None
-            for event in self.follower.absorb(self.flow.stage, now, reopens=reopens):
+            for event in [*self.follower.absorb(reopens=self.driver.asked is not None)]:
                 self.driver.take(event)
-        if self.model.hot:
-            while len(self.screen_stack) > 1:
-                self.screen.dismiss(None)
+        while self.model.hot and len(self.screen_stack) > 1:
+            self.screen.dismiss(None)
         self._follow()
         self.draw()
 
@@ -188,67 +181,35 @@ class RigApp(App[None], inherit_bindings=False):
 
     def draw(self) -> None:
         """Draw all changes since the last drawing."""
-        if not self._open():
-            return
-        model, size, base = self.model, self.size, self.screen_stack[0]
-        try:
-            base.query_one("#alarm")
-        except NoMatches:
+        if not self._open() or not self.screen_stack[0].query("#stop"):
             return  # the screen is opening or closing
-        message = self._told if model.now_s - self._told_s < _TOLD_S else ""
-        base.query_one(StatusBar).show(model, self.keys, size.width, message)
-        base.query_one(StopBar).show(model, self.keys, size.width, self.possible)
+        model, width = self.model, self.size.width - 2
+        wrong, is_told = problem(model), monotonic() - self._told_s < _TOLD_S
+        lines: dict[str, Content | str] = {
+            "headline": headline(model, width),
+            "tabs": tabs(model.page, self.keys),
+            "problem": wrong,
+            "told": plain(self._told, 240) if is_told and not wrong else "",
+            "hints": hints(model, self.keys, width),
+            "stop": stop_line(model, self.keys),
+        }
         for screen in self.screen_stack:
-            for line in screen.query(StopLine):
-                line.show(model, self.keys)
-        if self.page in self._faces:
-            face = self._faces[self.page](model, self.desk, self.sheet.tables_width())
-            self.sheet.show(face, self.desk, fresh=self.page != self._drawn)
-            self._drawn = self.page
+            screen.set_class(model.hot, "-hot")
+            for words in screen.query(Words):
+                if words.id in lines:
+                    words.say(lines[words.id])
+        if model.page in self._faces:
+            self.desk.width = self.sheet.tables_width()
+            face = self._faces[model.page](model, self.desk)
+            self.sheet.show(face, self.desk)
         # The operator sees a drawing only after the refresh.
         self.call_after_refresh(self._stillness.shown, self._face)
 
     @property
     def _face(self) -> Hashable:
         """Return the part of the view on which the meaning of a key depends."""
-        flow = self.flow
-        return self.page, flow.stage, flow.job, self.driving, id(self.screen)
-
-    # ------------------------------------------------------------------ what is known
-
-    @property
-    def flow(self) -> Flow:
-        """State of the campaign."""
-        return self.driver.flow
-
-    @property
-    def driving(self) -> bool:
-        """Whether this screen has control of the rig."""
-        return self.client.driving
-
-    @property
-    def model(self) -> Model:
-        """Return the data of the pages at this moment."""
-        client, follower, offline = self.client, self.follower, self.options.offline
-        return Model(
-            state=follower.state,
-            flow=self.flow,
-            stop=self.driver.stop,
-            disk_s=client.disk_s,
-            indicators=follower.indicators,
-            view=follower.view,
-            voids=follower.voids,
-            connected=offline or client.up,
-            driving=self.driving,
-            now_s=monotonic(),
-            silence=client.silence,
-            port=client.port,
-            offline=offline,
-            unreadable=follower.unreadable,
-            read=follower.done,
-            page=self.page,
-            idle=client.idle and not offline,
-        )
+        flow = self.model.flow
+        return self.model.page, flow.stage, flow.job, self.client.driving, id(self.screen)
 
     # ------------------------------------------------------------------ flow and pages
 
@@ -275,9 +236,7 @@ class RigApp(App[None], inherit_bindings=False):
             loaded = await asyncio.to_thread(import_module, f"rig.tui.pages.{module}")
             self._faces[page] = loaded.face
             self.draw()
-        await asyncio.to_thread(import_module, "rig.results.live")
-        if self._loaded is not None:
-            self._loaded()
+        self._loaded()
 
     @property
     def sheet(self) -> Page:
@@ -286,8 +245,10 @@ class RigApp(App[None], inherit_bindings=False):
 
     def turn(self, page: str) -> None:
         """Show a page, beginning with its first part."""
-        self.page = page
+        self.model.page = page
         self.desk.part = self.desk.chart = 0
+        if self._open():
+            self.sheet.rewind()
         self.draw()
 
     def turn_on(self, part: int = 0, chart: int = 0) -> None:
@@ -299,25 +260,19 @@ class RigApp(App[None], inherit_bindings=False):
     async def _look_around(self) -> None:
         """Update the list of the home page: sessions, protocols and boards."""
         survey = await asyncio.to_thread(import_module, "rig.tui.survey")
-        port, other = self.client.port, self.client.in_the_way
-        rows = await asyncio.to_thread(
-            survey.look_around, self.options, port, other[0] if other else ""
-        )
+        rows = await asyncio.to_thread(survey.look_around, self.options, self.client)
         self.desk.begin_with(rows)
         self.draw()
-        if self.desk.opens_first and self.page == "protocol":
+        if self.desk.opens_first and self.model.page == "protocol":
             self.action_do("go_on")
         self.desk.opens_first = False
 
-    def ask(self, question: Dialog, act: Callable[[Any], commands.Work] | None = None) -> None:
+    def ask(self, question: Dialog, act: Callable[[Any], commands.Work] = lambda _: None) -> None:
         """Open a dialog, and act on the answer; no dialog opens while a chain may fall."""
-
-        def act_on_answer(answer: Any) -> None:
-            if act is not None and answer is not None:
-                self.begin(act(answer))
-
         if not self.model.hot:
-            self.push_screen(question, act_on_answer)
+            self.push_screen(
+                question, lambda answer: self.begin(None if answer is None else act(answer))
+            )
             self.draw()
 
     def tell(self, text: str) -> None:
@@ -327,8 +282,8 @@ class RigApp(App[None], inherit_bindings=False):
 
     def next_theme(self) -> None:
         """Switch to the next colour theme."""
-        names = [theme.name for theme in THEMES]
-        self.theme = names[(names.index(self.theme) + 1) % len(names)]
+        following = THEMES.index(self.current_theme) + 1
+        self.theme = THEMES[following % len(THEMES)].name
 
     # ------------------------------------------------------------------ keys and mouse
 
@@ -367,7 +322,7 @@ class RigApp(App[None], inherit_bindings=False):
             return True
         if isinstance(screen, Dialog):
             return self._answers(screen, key, at_s)
-        if key == "enter" and self.page == "run" and self.flow.stage is Stage.PREPARE:
+        if key == "enter" and self.model.page == "run" and self.model.flow.stage is Stage.PREPARE:
             self._arm(at_s)
         elif name is not None:
             self.action_do(name)
@@ -375,26 +330,21 @@ class RigApp(App[None], inherit_bindings=False):
 
     def _ends_countdown(self) -> bool:
         """Stop a countdown to a release; return whether there was any."""
-        if self.flow.stage not in BEFORE_RELEASE:
+        if self.model.flow.stage not in BEFORE_RELEASE:
             return False
         self.driver.take(campaign.StopRequest())
         return True
 
     def _answers(self, dialog: Dialog, key: str, at_s: float) -> bool:
         """Let a key answer a dialog; return whether it did."""
-        by = {"up": -1, "down": 1}.get(key, 0)
-        if by and not isinstance(dialog, Confirm):
-            if dialog.is_mounted:
-                dialog.move(by)
-        elif key == "enter" and isinstance(dialog, Confirm):
-            if self._stillness.meant(self._face, at_s):
-                dialog.dismiss(True)
-        elif key == "enter" and isinstance(dialog, Ask):
-            return not self._stillness.read(self._face, at_s)  # pasted with what opened it
-        elif dialog.LEAVE in {"", key}:
-            dialog.dismiss(None)
-        else:
+        if isinstance(dialog, Ask):  # its field takes all but an Enter pasted with what opened it
+            return key == "enter" and not self._stillness.read(self._face, at_s)
+        if isinstance(dialog, TextDialog) and key in {"up", "down"}:
             return False
+        if not isinstance(dialog, Confirm) or key != "enter":
+            dialog.dismiss(None)
+        elif self._stillness.meant(self._face, at_s):
+            dialog.dismiss(True)
         return True
 
     def _arm(self, at_s: float) -> None:
@@ -402,29 +352,20 @@ class RigApp(App[None], inherit_bindings=False):
 
         Requires an Enter by itself: the run page was still, and no other key was pressed.
         """
-        if not self.driving:
+        if not self.client.driving:
             self.action_do("go_on")  # which shows the reason
         elif self._stillness.meant(self._face, at_s):
-            model = self.model
-            self.driver.take(campaign.GoOn(model.next_job, model.settle_s))
+            self.driver.take(campaign.GoOn(self.model.next_job, self.model.settle_s))
         else:
             self.driver.take(campaign.Notice(_NOT_MEANT))
 
     def action_do(self, name: str) -> None:
         """Do an action of the table, if it is possible now."""
         action = BY_NAME[name]
-        if self.possible(action):
-            commands.do(self, name)
-        elif action.driving and not self.driving and not self.options.offline:
-            self.driver.take(campaign.EffectFailure(self.flow.ticket, _WATCHING))
-
-    def possible(self, action: Action) -> bool:
-        """Whether an action is possible now."""
-        if self.options.offline and (action.driving or action.name in NEEDS_RIG):
-            return False
-        # Without a rig, an operator may start with a new one.
-        begins = action.name == "go_on" and self.flow.stage is Stage.PROTOCOL
-        return possible(action, self.flow.stage, driving=self.driving or begins)
+        if self.model.allows(action):
+            self.begin(commands.DO[name](self))
+        elif action.driving and not self.client.driving and not self.options.offline:
+            self.driver.take(campaign.EffectFailure(self.model.flow.ticket, _WATCHING))
 
     def action_choose(self, at: int) -> None:
         """Select a row of the home page."""

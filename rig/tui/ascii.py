@@ -39,7 +39,6 @@ def _character(letter: str) -> str:
 class AsciiFilter(LineFilter):
     """Filter that converts every drawn line to ASCII."""
 
-    def apply(self, segments: list[Segment], background: Color) -> list[Segment]:
+    def apply(self, segments: list[Segment], _background: Color) -> list[Segment]:
         """Return the segments of a line in ASCII."""
-        del background
         return [Segment(in_ascii(text), style, control) for text, style, control in segments]

@@ -1,7 +1,7 @@
 """Rows of the home page: what the operator may begin with."""
 
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from rig.errors import InputError
 from rig.protocol import reader
@@ -11,13 +11,8 @@ from rig.tui.context import Options
 from rig.tui.widgets.text import plain
 
 HERE = "Experiments here"
-
-
-class ProtocolFile(NamedTuple):
-    """A protocol, and the fault of its file; empty if it can be used."""
-
-    protocol: Protocol | None
-    problem: str = ""
+ProtocolFile: TypeAlias = tuple[Protocol | None, str]
+"""A protocol, and the fault of its file; empty if it can be used."""
 
 
 class Beginning(NamedTuple):
@@ -45,12 +40,10 @@ class Beginning(NamedTuple):
 
 def first_row(rows: list[Beginning], options: Options) -> int:
     """Return the row to select first: a blocking daemon, unfinished session, file or trial."""
-    for at, row in enumerate(rows):
-        if row.kind == "end":
-            return at
     sections = "Continue" * (not options.port), HERE, "Ready experiments"
-    places = [
-        (bool(read_file(row.file).problem), sections.index(row.section), at)
+    places = [(False, -1, at) for at, row in enumerate(rows) if row.kind == "end"]
+    places += [
+        (bool(read_file(row.file)[1]), sections.index(row.section), at)
         for at, row in enumerate(rows)
         if row.section in sections and row.file and (row.session or row.file in options.files)
     ]
@@ -65,5 +58,5 @@ def read_file(file: Path) -> ProtocolFile:
         check_recordable(protocol)
     except InputError as error:
         lines = [plain(problem, 300) for problem in error.problems]
-        return ProtocolFile(protocol, "\n".join(lines or [plain(error.message), plain(error.hint)]))
-    return ProtocolFile(protocol)
+        return protocol, "\n".join(lines or [plain(error.message), plain(error.hint)])
+    return protocol, ""

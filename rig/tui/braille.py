@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from itertools import groupby
 from operator import itemgetter
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,7 @@ COLUMNS, ROWS = 2, 4
 """Dots of a character."""
 BLANK = 0x2800
 _BITS = np.array([[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]])
+_PLACES = {bit: (at % COLUMNS, at // COLUMNS) for at, bit in enumerate(_BITS.ravel().tolist())}
 
 
 class Span(NamedTuple):
@@ -21,6 +22,10 @@ class Span(NamedTuple):
     text: str
     color: str = ""
     bold: bool = False
+
+
+Rows: TypeAlias = list[list[Span]]
+"""Lines of characters from the top, each a list of spans."""
 
 
 class Sheet:
@@ -83,17 +88,16 @@ class Sheet:
         for place, letter in enumerate(span.text, start=column):
             self._letters[row, place] = span._replace(text=letter)
 
-    def rows(self) -> list[list[Span]]:
-        """Return the drawing, a list of spans for each line of characters."""
+    def rows(self) -> Rows:
+        """Return the drawing."""
         return list(map(self._row, range(self.height)))
 
     def _row(self, row: int) -> list[Span]:
         cells = zip(self._bits[row].tolist(), self._inks[row].tolist(), strict=True)
         colors = *self._colors, ""
         # Every font has a blank.
-        letters = [Span(chr(BLANK + bits) if bits else " ", colors[ink]) for bits, ink in cells]
-        for (line, column), letter in self._letters.items():
-            letters[column : column + (line == row)] = [letter] * (line == row)
+        dots = (Span(chr(BLANK + bits) if bits else " ", colors[ink]) for bits, ink in cells)
+        letters = (self._letters.get((row, column), dot) for column, dot in enumerate(dots))
         runs = groupby(letters, key=itemgetter(1, 2))
         return [Span("".join(letter.text for letter in run), *look) for look, run in runs]
 
@@ -101,8 +105,5 @@ class Sheet:
 def dots_of(letter: str) -> list[tuple[int, int]]:
     """Return the dots of a braille character, column before row; empty for other characters."""
     bits = ord(letter) - BLANK
-    if not 0 < bits < 1 << COLUMNS * ROWS:
-        return []
-    return [
-        (x, y) for y, row in enumerate(_BITS.tolist()) for x, bit in enumerate(row) if bits & bit
-    ]
+    is_braille = 0 <= bits < 1 << COLUMNS * ROWS
+    return [place for bit, place in _PLACES.items() if is_braille and bits & bit]

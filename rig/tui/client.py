@@ -2,12 +2,12 @@
 
 import asyncio
 import os
-import subprocess
 import sys
 from collections.abc import Callable, Coroutine, Mapping
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
+from subprocess import DEVNULL, Popen
 from time import monotonic
 from typing import Any
 
@@ -60,23 +60,20 @@ class ReconnectingClient:
         self, url: str, socket: Path | None, connected: Callable[[], Coroutine[Any, Any, None]]
     ) -> None:
         self.url = url
-        self.path = self._usual_path = default_socket() if socket is None else socket
+        self.path = self._usual_path = socket or default_socket()
         self.name = f"rig tui {os.getpid()}"
         self.silence = "connecting"
-        self.changed = True
+        self.changed = self._wants_control = True
         self.lost: Mapping[str, Any] = {}
         self.in_the_way: tuple[str, int] | None = None
         self.disk_s = 0.0
         self.patience_s = _SILENT_S
-        self._hangs = False
+        self._hangs = self._had_control = self.is_trial = False
         self._connected = connected
         self._client: AsyncClient | None = None
-        self.daemon: subprocess.Popen[bytes] | None = None
-        self._had_control = False
-        self._wants_control = True
+        self.daemon: Popen[bytes] | None = None
         self._started_at = -_START_S
         self._port = ""
-        self.is_trial = False
 
     @property
     def idle(self) -> bool:
@@ -96,20 +93,19 @@ class ReconnectingClient:
     @property
     def state(self) -> DaemonState:
         """Latest state of the daemon."""
-        return read_state(self._client.replica.state if self._client else {})
+        return read_state(self._sections)
+
+    @property
+    def _sections(self) -> Mapping[str, Any]:
+        return self._client.replica.state if self._client else {}
 
     @property
     def driving(self) -> bool:
         """Whether this client has control."""
-        if not self.up or self._client is None:
-            return False
-        control = self._client.replica.state.get("control")
-        if control is None:
-            # On a busy machine control may lapse; unless another client takes it, our next call
-            # restores it.
-            return self._had_control
-        mine: bool = control["client"] == self.name
-        return mine
+        control = self._sections.get("control")
+        # On a busy machine control may lapse; unless another client takes it, our next call
+        # restores it.
+        return self.up and (control["client"] == self.name if control else self._had_control)
 
     @property
     def connection(self) -> AsyncClient:
@@ -170,17 +166,13 @@ class ReconnectingClient:
 
     async def keep(self) -> None:
         """Connect and reconnect until cancelled."""
-        try:
-            while True:
-                try:
-                    await self._once()
-                except RigError as error:
-                    self.silence = f"{error.message}\n{error.hint}"
-                self.changed = True
-                await asyncio.sleep(_AGAIN_S)
-        finally:
-            if self._client is not None:
-                await self._client.close()
+        while True:
+            try:
+                await self._once()
+            except RigError as error:
+                self.silence = f"{error.message}\n{error.hint}"
+            self.changed = True
+            await asyncio.sleep(_AGAIN_S)
 
     async def _once(self) -> None:
         """Connect once, and stay connected as long as possible."""
@@ -192,11 +184,14 @@ class ReconnectingClient:
             return
         reached = None
         try:
-            self._check(client.line.daemon)
+            self._port = str(client.line.daemon["port"])
+            if self.url and self._port != self.url:
+                self.in_the_way = self._port, int(client.line.daemon["pid"])
+                raise rig_error("daemon_port", port=self._port, wanted=self.url)
             client.changed = partial(self._note, client.replica)
             await client.call("subscribe")
             self._client, self.silence = client, ""
-            if self._wants_control and client.replica.state.get("control") is None:
+            if self._wants_control and self._sections.get("control") is None:
                 with suppress(RigError):
                     await self.take_control()
             # In parallel with heartbeats: opening a session may take longer than control lasts.
@@ -236,34 +231,22 @@ class ReconnectingClient:
             with suppress(TimeoutError):
                 await asyncio.wait_for(client.lost.wait(), _BEAT_S)
 
-    def _check(self, daemon: Mapping[str, Any]) -> None:
-        """Check that the daemon has the requested port."""
-        self._port = str(daemon["port"])
-        if self.url and self._port != self.url:
-            self.in_the_way = self._port, int(daemon["pid"])
-            raise rig_error("daemon_port", port=self._port, wanted=self.url)
-
     def _start(self, error: DeviceError) -> None:
         """Start a daemon that outlives this screen until it is idle."""
         if not self.url:
             raise error
-        now = asyncio.get_running_loop().time()
-        if now - self._started_at < _START_S:
+        if monotonic() - self._started_at < _START_S:
             return
-        self._started_at = now
+        self._started_at = monotonic()
         if self.daemon is not None:
             self.daemon.poll()  # reaps the previous process
         prepare_folder(self.path.parent)
         # Its last messages would otherwise be lost with the terminal.
         with self.path.with_suffix(".log").open("ab") as log:
             command = [sys.executable, "-m", "rig", "daemon", "--port", self.url]
-            command += ["--idle-timeout", str(_IDLE_S)]
-            self.daemon = subprocess.Popen(
-                [*command, "--socket", str(self.path)],
-                stdin=subprocess.DEVNULL,
-                stdout=log,
-                stderr=log,
-                start_new_session=True,
+            command += ["--idle-timeout", str(_IDLE_S), "--socket", str(self.path)]
+            self.daemon = Popen(
+                command, stdin=DEVNULL, stdout=log, stderr=log, start_new_session=True
             )
         self.silence = "starting the daemon"
 

@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 from functools import partial
 from importlib import import_module
 from itertools import count
+from operator import methodcaller
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,7 @@ from rig.analysis.result import GOOD
 from rig.campaign.machine import Again, GoOn, Note, Notice, Reject, Restore, Stage, StopRequest, Try
 from rig.reasons import notes_in
 from rig.text_rows import read_rows
-from rig.tui.actions import ACTIONS, help_text, shown_key
+from rig.tui.actions import ACTIONS, PAGES, help_text, shown_key
 from rig.tui.follow import open_live
 from rig.tui.replay import Player
 from rig.tui.widgets.dialogs import Ask, Confirm, TextDialog
@@ -38,32 +39,20 @@ if TYPE_CHECKING:
 _QUESTIONS = {name: texts for name, *texts in read_rows(__file__, "questions.txt")}
 REASONS = [reason for (reason,) in read_rows(__file__, "rejections.txt")]
 """Frequent reasons to reject a drop within its limits; the operator may type another."""
+_FLASH = "flash", "--board"
 _ONLY_ENTER = "only the Enter key arms the release\npress it half a second after any other key"
-
-
-def do(app: RigApp, name: str) -> None:
-    """Do an action of the table, which must be possible now.
-
-    Actions run synchronously, as their effect depends on the state when the key is handled. Only
-    work that waits for the daemon or files, which they return, runs in the background, and none of
-    that arms.
-    """
-    if name.startswith("page_"):
-        app.turn(name.removeprefix("page_"))
-    else:
-        app.begin(_DO[name](app))
 
 
 def _go_on(app: RigApp) -> Work:
     """Take the next step of the flow, but never arm: see `rig.tui.app.RigApp._arm`."""
-    stage = app.driver.flow.stage
-    if stage is Stage.PREPARE and app.page == "run":
+    stage = app.model.flow.stage
+    if stage is Stage.PREPARE and app.model.page == "run":
         app.driver.take(Notice(_ONLY_ENTER))
     elif stage is Stage.PREPARE:
         app.turn("run")
     elif stage is not Stage.PROTOCOL:
         app.driver.take(GoOn(app.model.next_job))
-    elif app.page != "protocol":
+    elif app.model.page != "protocol":
         app.turn("protocol")
     elif (row := app.desk.chosen) is None:
         app.desk.opens_first = True
@@ -78,9 +67,7 @@ def _go_on(app: RigApp) -> Work:
 def _open(app: RigApp, row: Beginning) -> Work:
     """Open an experiment with the connected rig, or in simulation without a rig."""
     client = app.client
-    if row.file is None:
-        return None
-    if app.desk.reading(row.file).problem:
+    if row.file is None or app.desk.reading(row.file)[1]:
         app.tell("mend the file in an editor; it is read again by itself")
         return None
     session = row.session or app.options.session
@@ -105,11 +92,6 @@ def _connect(app: RigApp, row: Beginning) -> None:
         app.tell("plug the board in by USB; it appears here by itself")
 
 
-def _flash(app: RigApp, row: Beginning) -> None:
-    flash = partial(_run, app, "flash", "--board", row.value)
-    _confirm(app, "flash", flash)
-
-
 def _new(app: RigApp, row: Beginning) -> Work:
     """Draft a protocol under an unused name."""
     names = (f"my-{row.value}{number or ''}.yaml" for number in count())
@@ -118,7 +100,7 @@ def _new(app: RigApp, row: Beginning) -> Work:
     return _run(app, "new", name, "--scene", row.value, "--yes", done=written)
 
 
-def _end_other(app: RigApp, row: Beginning) -> None:
+def _end_other(app: RigApp, _: Beginning) -> None:
     """Ask, then end the daemon of another port."""
     client = app.client
     if client.in_the_way is None:
@@ -129,7 +111,6 @@ def _end_other(app: RigApp, row: Beginning) -> None:
         with suppress(ProcessLookupError):
             os.kill(process, signal.SIGTERM)
 
-    del row
     _confirm(app, "end", end, port=plain(port, 40))
 
 
@@ -137,7 +118,7 @@ _BEGIN: dict[str, Callable[[RigApp, Beginning], Work]] = {
     "try": _open,
     "open": _open,
     "board": _connect,
-    "flash": _flash,
+    "flash": lambda app, row: _confirm(app, "flash", lambda: _run(app, *_FLASH, row.value)),
     "new": _new,
     "end": _end_other,
     "results": lambda app, _: _sessions(app),
@@ -146,21 +127,10 @@ _BEGIN: dict[str, Callable[[RigApp, Beginning], Work]] = {
 
 def _control(app: RigApp) -> Work:
     """Take control, or ask whether to give it back."""
-    client = app.client
-    if not client.driving:
-        return client.take_control()
-    _confirm(app, "control", client.release_control)
+    if not app.client.driving:
+        return app.client.take_control()
+    _confirm(app, "control", app.client.release_control)
     return None
-
-
-def _close(app: RigApp) -> None:
-    """Ask, then close the session, so that another can be chosen."""
-
-    def close() -> Work:
-        app.driver.asked = None
-        return _ask(app, "close_session")
-
-    _confirm(app, "close", close)
 
 
 def _quit(app: RigApp) -> None:
@@ -175,23 +145,17 @@ def _confirm(app: RigApp, name: str, act: Callable[[], Work], **values: object) 
     app.ask(Confirm(title, question, yes), lambda _: act())
 
 
-async def _ask(app: RigApp, method: str) -> None:
-    """Ask the daemon for something; see rig/daemon/API.md."""
-    await app.client.connection.call(method)
-
-
 def _try_release(app: RigApp) -> None:
     """Ask, then drive the release once."""
     app.turn("device")
-    view = app.model.view
-    if view is None:
-        return
-    values = {"pulse_ms": view.protocol.release.pulse * 1e3, "body": view.protocol.vocabulary.body}
-    _confirm(app, "release_test", lambda: app.driver.take(Try()), **values)
+    protocol = app.model.protocol
+    if protocol is not None:
+        values = {"pulse_ms": protocol.release.pulse * 1e3, "body": protocol.vocabulary.body}
+        _confirm(app, "release_test", lambda: app.driver.take(Try()), **values)
 
 
 def _note(app: RigApp) -> None:
-    text = " · ".join(notes_in(app.driver.flow.reasons))
+    text = " · ".join(notes_in(app.model.flow.reasons))
     app.ask(Ask("Note on this drop:", text), lambda text: app.driver.take(Note(text)))
 
 
@@ -208,8 +172,7 @@ async def _sessions(app: RigApp) -> None:
     app.turn("history")
     whole = (at for at, entry in enumerate(entries) if not entry.trouble)
     title = f"Sessions in {plain(folder.resolve(), 80)}, newest first"
-    lines = [_session_line(entry) for entry in entries]
-    question = Ask(title, choices=lines, free=False, yes="play", chosen=next(whole, 0))
+    question = Ask(title, "", [*map(_session_line, entries)], yes="play", chosen=next(whole, 0))
     app.ask(question, lambda number: _look_at(app, entries[number]))
 
 
@@ -231,9 +194,9 @@ def _session_line(entry: SessionEntry) -> str:
 def _move(app: RigApp, by: int) -> None:
     """Move in the list of a page, or scroll."""
     desk = app.desk
-    if app.page == "history":
-        desk.choose(app.model, desk.players["history"].at + by)
-    elif app.page == "protocol" and app.flow.stage is Stage.PROTOCOL and desk.rows:
+    if app.model.page == "history":
+        desk.move(app.model, by)
+    elif app.model.page == "protocol" and app.model.flow.stage is Stage.PROTOCOL and desk.rows:
         app.action_choose((desk.row + by) % len(desk.rows))
     else:
         app.sheet.scroll_tables(by)
@@ -248,13 +211,12 @@ def _change(work: Callable[[Player, float], Player]) -> Callable[[RigApp], Work]
 
 def _write(app: RigApp, command: str, option: str, suffix: str) -> None:
     """Ask, then run a command that writes files of the shown session beside it."""
-    view = (app.desk.view(app.model) if app.page == "history" else None) or app.model.view
+    view = (app.desk.other if app.model.page == "history" else None) or app.model.view
     if view is None:
         app.tell(app.model.loading or "no session is open: press o to choose one")
         return
     target = view.path.with_suffix(suffix)
-    write = partial(_run, app, command, view.path, option, target)
-    _confirm(app, "write", write, target=target)
+    _confirm(app, "write", lambda: _run(app, command, view.path, option, target), target=target)
 
 
 async def _run(app: RigApp, *command: str | Path, done: str = "") -> None:
@@ -282,8 +244,7 @@ def _reject(app: RigApp) -> None:
     """Ask for the reason to reject a drop, or whether to undo a rejection."""
     model = app.model
     if model.flow.verdict == "rejected":
-        verdict, _ = model.flow.judged
-        _confirm(app, "undo", lambda: app.driver.take(Restore()), verdict=verdict)
+        _confirm(app, "undo", lambda: app.driver.take(Restore()), verdict=model.flow.judged[0])
         return
 
     question = "Why is this drop rejected?"
@@ -311,23 +272,22 @@ def _unblind(app: RigApp) -> None:
     if not app.model.blind:
         app.driver.take(Notice("this session is not blind\nwrite blind: true in its protocol"))
         return
-    _confirm(app, "unblind", lambda: _ask(app, "unblind"))
+    _confirm(app, "unblind", lambda: app.client.connection.call("unblind"))
 
 
 def _begin_check(app: RigApp) -> None:
-    app.follower.indicators = app.follower.indicators.reset()
+    app.model.indicators = app.model.indicators.reset()
 
 
 def _palette(app: RigApp) -> None:
     """Search the actions that are possible now."""
-    possible = filter(app.possible, ACTIONS)
-    actions = [action for action in possible if action.name != "palette"]
+    actions = [each for each in ACTIONS if each.name != "palette" and app.model.allows(each)]
     lines = [f"{shown_key(app.keys[action.name]):8}{action.text}" for action in actions]
-    question = Ask("Search commands", choices=lines, free=False, yes="run", chosen=0)
+    question = Ask("Search commands", choices=lines, yes="run", chosen=0)
     app.ask(question, lambda number: app.action_do(actions[number].name))
 
 
-_DO: dict[str, Callable[[RigApp], Work]] = {
+DO: dict[str, Callable[[RigApp], Work]] = {
     "stop": lambda app: app.driver.take(StopRequest()),
     "reject": _reject,
     "note": _note,
@@ -344,7 +304,7 @@ _DO: dict[str, Callable[[RigApp], Work]] = {
     "quit": _quit,
     "go_on": _go_on,
     "control": _control,
-    "close": _close,
+    "close": lambda app: _confirm(app, "close", app.driver.close_session),
     "release_test": _try_release,
     "sessions": _sessions,
     "play": _change(Player.toggle_play),
@@ -354,4 +314,10 @@ _DO: dict[str, Callable[[RigApp], Work]] = {
     "export": lambda app: _write(app, "export", "--csv", ".csv"),
     "slower": _change(lambda player, _: player.change_speed(0.5)),
     "faster": _change(lambda player, _: player.change_speed(2.0)),
+    **{f"page_{page}": methodcaller("turn", page) for page, *_ in PAGES},
 }
+"""Actions of the table, by name.
+
+They run synchronously, as their effect depends on the state when the key is handled. Only work that
+waits for the daemon or files, which they return, runs in the background, and none of that arms.
+"""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from textual.content import Content
 
+from rig.files import file_stamp
 from rig.records import Job
 from rig.tui.beginnings import HERE, Beginning, ProtocolFile, first_row, read_file
 from rig.tui.context import Options
@@ -48,7 +49,7 @@ class Face(NamedTuple):
         Whether words come before the drawing.
     """
 
-    head: Content
+    head: Content = Content("")
     drawing: Drawing | None = None
     pictures: Sequence[Picture] = ()
     moment: float | None = None
@@ -75,6 +76,8 @@ class Desk:
         The latest drop whose slow motion was started.
     chart, part, row
         Number of switches of plot and of page part so far; the row of a list.
+    width
+        Columns of the tables.
     """
 
     def __init__(self, options: Options) -> None:
@@ -83,6 +86,7 @@ class Desk:
         self.other: SessionView | None = None
         self.chart = self.part = 0
         self.row = -1  # no row yet
+        self.width = 0
         self.opens_first = False
         self.rows: list[Beginning] = []
         self.opened: Path | None = None  # last protocol opened here
@@ -106,11 +110,7 @@ class Desk:
 
     def reading(self, file: Path) -> ProtocolFile:
         """Return a protocol, read again if the file has changed, for example in an editor."""
-        try:
-            changed_ns = file.stat().st_mtime_ns
-        except OSError:
-            changed_ns = -1
-        return self.latest("reading", (file, changed_ns), lambda: read_file(file))
+        return self.latest("reading", (file, file_stamp(file)), lambda: read_file(file))
 
     def begin_with(self, rows: list[Beginning]) -> None:
         """Set the rows of the home page; select a new experiment, or keep the selection."""
@@ -124,16 +124,12 @@ class Desk:
         view = self.other or model.view
         return view if view and view.jobs else None
 
-    def job(self, model: Model) -> Job | None:
-        """Return the drop of the history page."""
-        view = self.view(model)
-        return view.jobs[self.players["history"].at % len(view.jobs)] if view else None
-
     def drop(self, model: Model) -> tuple[SessionView | None, Job | None]:
         """Return the drop of the shown page, once analysed."""
-        if model.page == "history":
-            return self.view(model), self.job(model)
         view, job = model.view, model.job
+        if model.page == "history":
+            view = self.view(model)
+            job = view.jobs[self.players["history"].at % len(view.jobs)] if view else None
         return (view, job) if view is not None and job in view.results else (None, None)
 
     def change(self, model: Model, change: Callable[[Player, float], Player]) -> None:
@@ -149,11 +145,9 @@ class Desk:
         if fresh and job not in {None, self.replayed}:
             self.replayed = job
             self.change(model, lambda _, end_s: Player(speed=end_s / REPLAY_S, playing=True))
-        if self.players[model.page].playing:
-            self.change(model, lambda player, end_s: player.advance(seconds, end_s))
+        self.change(model, lambda player, end_s: player.advance(seconds, end_s))
 
-    def choose(self, model: Model, at: int) -> None:
-        """Select a drop of the list, from its beginning."""
-        view = self.view(model)
-        tape, count = self.players["history"], len(view.jobs) if view else 0
-        self.players["history"] = tape.other(at - tape.at, count)
+    def move(self, model: Model, by: int) -> None:
+        """Select another drop of the history page, from its beginning."""
+        view, player = self.view(model), self.players["history"]
+        self.players["history"] = player.other(by, len(view.jobs) if view else 1)

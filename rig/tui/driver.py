@@ -1,26 +1,25 @@
 """Asynchronous driver of a campaign, which carries out effects in the background."""
 
 from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
 from time import monotonic
 from typing import Any
 
 from rig.campaign import machine as campaign
-from rig.campaign.machine import Effect, Event, Flow, Stage, effect_failure, step
+from rig.campaign.machine import Effect, Event, Stage, effect_failure, step
 from rig.errors import DeviceTimeoutError, RigError
-from rig.tui.client import ReconnectingClient
 from rig.tui.follow import Follower
-from rig.tui.model import StopAnswer
+from rig.tui.model import Model, StopAnswer
 
 
+@dataclass
 class Driver:
     """Handles events of a campaign in order.
 
     Parameters
     ----------
-    flow
-        Initial state of the campaign.
-    client
-        Client that carries out effects; `None` without a daemon.
+    model
+        Where the state of the campaign is, and the client that carries out effects.
     follower
         Reader of the session.
     begin
@@ -28,59 +27,49 @@ class Driver:
 
     Attributes
     ----------
-    flow
-        State of the campaign.
-    stop
-        Answer to the latest STOP; `None` before the first.
     asked
         Protocol and session that were opened from here; `None` after they were closed.
     """
 
-    def __init__(
-        self,
-        flow: Flow,
-        client: ReconnectingClient,
-        follower: Follower,
-        begin: Callable[[Coroutine[Any, Any, None]], object],
-    ) -> None:
-        self.flow = flow
-        self.stop: StopAnswer | None = None
-        self.asked: tuple[str, str] | None = None
-        self._client = client
-        self._follower = follower
-        self._begin = begin
+    model: Model
+    follower: Follower
+    begin: Callable[[Coroutine[Any, Any, None]], object]
+    asked: tuple[str, str] | None = None
 
     def take(self, event: Event) -> None:
         """Handle an event, and carry out its effects."""
-        self.flow, effects = step(self.flow, event)
-        if self.flow.stage is Stage.RESULT and self.flow.job is not None:
-            self._follower.judged.add(self.flow.job)
+        model = self.model
+        flow, effects = step(model.flow, event)
+        model.flow = flow
+        if flow.stage is Stage.RESULT and flow.job is not None:
+            self.follower.judged.add(flow.job)
         for effect in effects:
-            if isinstance(effect, campaign.Stop) and self._client.idle:
+            if isinstance(effect, campaign.Stop) and model.client.idle:
                 continue  # without a rig, no chain can fall
             if isinstance(effect, campaign.Stop):
-                self.stop = StopAnswer(monotonic())
-            self._begin(self._carry_out(effect, self.flow.ticket))
-
-    def refuse(self, error: RigError) -> None:
-        """Show an error with its remedy."""
-        self.take(effect_failure(self.flow.ticket, error))
+                model.stop = StopAnswer(monotonic())
+            self.begin(self._carry_out(effect, flow.ticket))
 
     async def open_session(self, protocol: str, session: str, seed: int | None) -> None:
         """Open a session in the daemon, now and after each restart."""
         names = {"protocol": protocol, "session": session, "seed": seed}
-        await self._client.connection.call("open_session", **names)
+        await self.model.client.connection.call("open_session", **names)
         self.asked = protocol, session
+
+    async def close_session(self) -> None:
+        """Close the session, so that another can be chosen."""
+        self.asked = None
+        await self.model.client.connection.call("close_session")
 
     async def _carry_out(self, effect: Effect, ticket: int) -> None:
         """Carry out an effect, and handle the resulting event."""
-        client, token = self._client, None
+        client, token = self.model.client, None
         try:
             match effect:
                 case campaign.GiveUp():
                     return  # the error is shown, and the operator decides
                 case campaign.Stop(reason):
-                    await self._switch_off(client, reason)
+                    await self._switch_off(reason)
                     return
                 case campaign.Wait(seconds):
                     await client.connection.call("wait", seconds=seconds)
@@ -97,8 +86,8 @@ class Driver:
                     verdict = {"state": state, "reasons": [reason.record() for reason in reasons]}
                     await client.connection.call("log_state", **job._asdict(), **verdict)
                 case campaign.Judge(job):
-                    result = (await self._follower.read()).results[job]
-                    row = self._follower.voids.row
+                    result = (await self.follower.read()).results[job]
+                    row = self.model.voids.row
                     self.take(campaign.DropVerdict(ticket, result.verdict, result.reasons, row))
                     return
         except RigError as error:
@@ -106,18 +95,19 @@ class Driver:
         else:
             self.take(campaign.EffectDone(ticket, token))
 
-    async def _switch_off(self, client: ReconnectingClient, reason: str) -> None:
+    async def _switch_off(self, reason: str) -> None:
         """Switch all outputs off, and repeat until the result is known.
 
         The daemon answers within a second, even without an answer of the board.
         """
-        asked, is_known = self.stop, False
-        while not is_known and asked is self.stop:
+        model, is_known = self.model, False
+        asked = model.stop
+        while not is_known and asked is model.stop:
             try:
-                await client.connection.call("stop", reason=reason)
+                await model.client.connection.call("stop", reason=reason)
             except RigError as error:
                 heard, is_known = False, not isinstance(error, DeviceTimeoutError)
             else:
                 heard = is_known = True
-            if asked is not None and asked is self.stop:
-                asked = self.stop = asked._replace(heard=heard)
+            if asked is not None and asked is model.stop:
+                asked = model.stop = asked._replace(heard=heard)

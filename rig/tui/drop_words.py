@@ -1,22 +1,17 @@
 """A drop in words: its run, and its results with the model and free fall for comparison."""
 
-from __future__ import annotations
-
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from rig.measurands import SEPARATION, averaged
 from rig.predictions import predicted_run
 from rig.printable import one_line
+from rig.protocol.protocol import Protocol, Run
 from rig.records import Job
 from rig.report.numbers import plus_minus
 from rig.report.parts import tables
+from rig.results.live import SessionView
 from rig.text_rows import read_rows
 from rig.text_table import text_table
-
-if TYPE_CHECKING:
-    from rig.protocol.protocol import Protocol, Run
-    from rig.results.live import SessionView
 
 LOOKS = {name: (sign, colour) for name, sign, colour in read_rows(__file__)}
 """Sign and colour of each verdict and state of a drop."""
@@ -35,11 +30,8 @@ def headline(run: Run, total: int, attempt: int) -> str:
 def expected_words(protocol: Protocol, run: Run) -> str:
     """Return the model's prediction for a run in words; empty without a prediction."""
     expected = predicted_run(protocol, run)
-    values = [
-        f"{row.symbol} {plus_minus(expected[row.name], row.scale)} {row.unit}"
-        for row in averaged(expected)
-    ]
-    return "  ".join(values)
+    values = ((row, plus_minus(expected[row.name], row.scale)) for row in averaged(expected))
+    return "  ".join(f"{row.symbol} {value} {row.unit}" for row, value in values)
 
 
 def sentence(view: SessionView, job: Job) -> str:
@@ -75,18 +67,14 @@ def number_table(view: SessionView, job: Job) -> str:
 
     "Alone" is the result of the drop by itself, "together" that of the session's joint fit.
     """
-    alone, run = view.results[job], view.plan[job.run]
-    joint = (
-        drop
-        for drop in view.analysis.runs
-        if view.fitted and (drop.run.number, drop.attempt) == job
-    )
-    results = {"alone": alone} | dict(zip(("together",), joint, strict=False))
+    runs = view.analysis.runs if view.fitted else ()
+    joint = (drop for drop in runs if (drop.run.number, drop.attempt) == job)
+    results = dict(zip(("alone", "together"), (view.results[job], *joint), strict=False))
     lines = []
     for part in tables("runs", results.values()):
         names = [name for name, _ in part.head]
         lines += text_table([["", *results], *zip(names, *part.rows, strict=True)], left={0})
         lines += part.sentences
-    expected = expected_words(view.protocol, run)
-    lines += [f"model  {expected}"] if expected else []
+    expected = expected_words(view.protocol, view.plan[job.run])
+    lines += [f"model  {expected}"] * bool(expected)
     return "\n".join(lines)

@@ -3,11 +3,10 @@
 import os
 import re
 import tomllib
-import unicodedata
 from collections.abc import Mapping
 from pathlib import Path
 
-from textual.keys import Keys
+from textual.keys import Keys, key_to_character
 
 from rig.errors import InputError
 from rig.files import read_input
@@ -16,14 +15,7 @@ from rig.tui.actions import ACTIONS, BY_NAME
 ALWAYS = {"stop": "f9", "go_on": "enter"}
 """Keys that an action keeps in addition to the operator's own."""
 _HOW = 'write one line for each action, such as reject = "r"'
-RESERVED = ("escape",)
-"""Keys whose meaning is fixed."""
-
-
-def default_file() -> Path:
-    """Return the default path of the file."""
-    base = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
-    return Path(base) / "chainrig" / "keys.toml"
+_HELD = {"ctrl", "shift", "alt"}
 
 
 def read_keys(path: Path | None = None) -> dict[str, str]:
@@ -32,14 +24,15 @@ def read_keys(path: Path | None = None) -> dict[str, str]:
     Parameters
     ----------
     path
-        The file; by default `default_file`, which need not exist.
+        The file; by default that of the user's configuration, which need not exist.
 
     Raises
     ------
     InputError
         With every problem: unknown actions, keys given twice, no TOML.
     """
-    place = path or default_file()
+    base = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
+    place = path or Path(base) / "chainrig" / "keys.toml"
     if path is None and not place.is_file():
         return {action.name: action.keys for action in ACTIONS}
     try:
@@ -93,7 +86,7 @@ def merge_keys(
             continue
         given[name] = [*keys, *{ALWAYS.get(name, keys[0])}.difference(keys)]
         for key in given[name]:
-            if key in RESERVED:
+            if key == "escape":
                 faults.append(f"{at}: {name}: {key} always means STOP")
             elif not _is_key(key):
                 examples = "r, f5, ctrl+r, enter, question_mark"
@@ -112,13 +105,6 @@ def merge_keys(
 def _is_key(key: str) -> bool:
     """Whether a terminal may send a key, by Textual's names."""
     *held, last = key.split("+")
-    if not set(held) <= {"ctrl", "shift", "alt"}:
-        return False
-    if len(last) == 1:
-        return last.isalnum()  # other keys have names, such as question_mark
-    if last in {name.value for name in Keys}:
-        return True
-    try:
-        return bool(unicodedata.lookup(last.replace("_", " ")))
-    except KeyError:
-        return False
+    is_named = last in {name.value for name in Keys} or key_to_character(last) is not None
+    # Of single characters only letters and digits: others have names, such as question_mark.
+    return set(held) <= _HELD and (last.isalnum() if len(last) == 1 else is_named)

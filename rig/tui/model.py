@@ -13,12 +13,14 @@ from rig.protocol.protocol import Protocol, Run
 from rig.reasons import Reason
 from rig.recorder.run_lines import RunLine
 from rig.records import Job
+from rig.tui.actions import NEEDS_RIG, Action
+from rig.tui.client import ReconnectingClient
 from rig.tui.indicators import Indicators
 from rig.tui.state import DaemonState
 from rig.vocabulary import ANY_SCENE, Vocabulary
 
 if TYPE_CHECKING:
-    from rig.results.live import SessionView
+    from rig.results.live import LiveAnalysis, SessionView
 
 SLOW_DISK_S = 0.5
 """Duration of a disk write that is a problem, s: normal writes take milliseconds, and messages of
@@ -31,13 +33,6 @@ WATCHED = {"armed": Stage.COUNTDOWN, "fired": Stage.LIVE, "recorded": Stage.RESU
 """Stage of a watcher, by the state of the drop."""
 
 
-class Alarm(NamedTuple):
-    """A problem, and its remedy."""
-
-    message: str
-    hint: str = ""
-
-
 class StopAnswer(NamedTuple):
     """State of the latest STOP: time of sending (monotonic, s), and `heard` once known."""
 
@@ -45,55 +40,55 @@ class StopAnswer(NamedTuple):
     heard: bool | None = None
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass
 class Model:
-    """Data of the screens at a moment.
+    """Data of the screens, as the parts of the program that know them write them here.
 
     Attributes
     ----------
-    voids
-        Void drops by the session's log.
-    connected
-        Whether the daemon answers.
-    driving
-        Whether this screen has control of the rig.
-    now_s
-        Monotonic time, s.
-    silence
-        Why the daemon does not answer.
+    client
+        Connection to the daemon.
+    flow
+        State of the campaign.
     offline
         Whether only a file is shown.
+    state
+        Latest state of the daemon.
+    indicators
+        State of the gates.
+    live
+        Analysis of the session file, while a session is open.
+    view
+        Latest view of the session file.
+    voids
+        Void drops by the session's log.
     unreadable
-        Why the session file cannot be read.
-    read
-        Number of its drops analysed so far.
+        Why the session file cannot be read; empty if it can.
     stop
-        State of the latest STOP.
-    disk_s
-        Duration of the present disk write, s.
+        State of the latest STOP; `None` before the first.
     page
         The page that is shown.
-    idle
-        Whether no rig was ever requested or connected, which is not a fault.
     """
 
-    state: DaemonState
+    client: ReconnectingClient
     flow: Flow
-    indicators: Indicators
+    offline: bool = False
+    state: DaemonState = field(default_factory=DaemonState)
+    indicators: Indicators = field(default_factory=Indicators)
+    live: LiveAnalysis | None = None
     view: SessionView | None = None
     voids: Voids = field(default_factory=Voids)
-    connected: bool = False
-    driving: bool = False
-    now_s: float = 0.0
-    silence: str = ""
-    port: str = ""
-    offline: bool = False
     unreadable: str = ""
-    read: int = 0
     stop: StopAnswer | None = None
-    disk_s: float = 0.0
     page: str = ""
-    idle: bool = False
+
+    def allows(self, action: Action) -> bool:
+        """Whether an action is possible now."""
+        has_rig = not self.offline or action.name not in NEEDS_RIG
+        # Without a rig, an operator may start with a new one.
+        begins = action.name == "go_on" and self.flow.stage is Stage.PROTOCOL
+        is_held = self.client.driving or begins or not action.driving
+        return has_rig and is_held and self.flow.stage in action.stages
 
     @property
     def protocol(self) -> Protocol | None:
@@ -106,10 +101,12 @@ class Model:
         flow, job = self.flow, self.flow.job
         if flow.stage is not Stage.RESULT or job is None:
             return self.state.runs
-        return tuple(
-            line._replace(state=flow.verdict, attempt=job.attempt) if line.run == job.run else line
-            for line in self.state.runs
-        )
+
+        def latest(line: RunLine) -> RunLine:
+            verdict = line._replace(attempt=job.attempt, state=flow.verdict, reasons=flow.reasons)
+            return verdict if line.run == job.run else line
+
+        return tuple(map(latest, self.state.runs))
 
     @property
     def next_job(self) -> Job | None:
@@ -129,7 +126,7 @@ class Model:
         if self.offline:
             return latest
         drop = self.state.section("drop")
-        if drop and not self.driving:
+        if drop and not self.client.driving:
             return Job(drop["run"], drop["attempt"])
         if self.flow.stage in _BETWEEN:
             return latest if self.page == "result" and latest else self.next_job
@@ -149,15 +146,14 @@ class Model:
         waits = self.offline or bool(self.state.section("session"))
         if self.view is not None or self.unreadable or not waits:
             return ""
-        return f"Loading the session: {self.read} drops so far …"
+        return f"Loading the session: {self.live.done if self.live else 0} drops so far …"
 
     @property
     def stage(self) -> Stage:
         """Stage of the session: from our own flow, or for a watcher from the daemon."""
-        if self.driving or not self.connected:
+        if self.client.driving or not self.client.up:
             return self.flow.stage
-        seen = WATCHED.get(str(self.state.section("drop").get("state")))
-        return self.flow.stage if seen is None else seen
+        return WATCHED.get(str(self.state.section("drop").get("state")), self.flow.stage)
 
     @property
     def hot(self) -> bool:
@@ -172,37 +168,30 @@ class Model:
     @property
     def run(self) -> Run | None:
         """The current planned run."""
-        if self.view is None or self.job is None:
-            return None
-        return self.view.plan.get(self.job.run)
+        return self.view.plan.get(self.job.run) if self.view and self.job else None
 
     @property
     def verdict(self) -> tuple[str, tuple[Reason, ...]]:
         """Verdict and reasons of the present attempt; empty before the verdict."""
-        if self.flow.stage is Stage.RESULT and self.flow.job == self.job:
-            return self.flow.verdict, self.flow.reasons
-        line = self.state.line(self.job.run) if self.job else None
-        if line is None or self.job is None or line.attempt != self.job.attempt:
-            return "", ()
-        return line.state, line.reasons
+        job = self.job
+        lines = (line for line in self.runs if (line.run, line.attempt) == job)
+        return next(((line.state, line.reasons) for line in lines), ("", ()))
 
     @property
     def previous(self) -> Job | None:
         """The latest good attempt that the present attempt replaces; `None` if there is none."""
-        if self.view is None or self.job is None:
-            return None
-        run, attempt = self.job
-        earlier = [
-            job
-            for job, result in self.view.results.items()
-            if job.run == run and job.attempt < attempt and result.verdict in GOOD
-        ]
-        return earlier[-1] if earlier else None
+        results = self.view.results if self.view else {}
+        good = {job for job, result in results.items() if result.verdict in GOOD}
+        present = self.job or Job(0, 0)
+        earlier = (job for job in good if job.run == present.run and job < present)
+        return max(earlier, default=None)
 
     @property
     def simulated(self) -> bool:
         """Whether the data are simulated, and must be marked."""
-        return self.state.simulated or bool(self.view and self.view.simulated)
+        sections = map(self.state.section, ("port", "session"))
+        is_rig = any(section.get("simulated") for section in sections)
+        return is_rig or bool(self.view and self.view.simulated)
 
     @property
     def blind(self) -> bool:
@@ -210,32 +199,27 @@ class Model:
         return bool(self.state.section("session").get("blind") or (self.view and self.view.blind))
 
 
-def alarm(model: Model) -> Alarm | None:
-    """Return the most serious present problem; `None` without problems."""
-    if not model.connected and not model.idle:
-        silence, _, hint = model.silence.partition("\n")
+def alarm(model: Model) -> str:
+    """Return the most serious present problem, and its remedy on a second line; or nothing."""
+    if not model.client.up and not model.client.idle:
+        silence, _, hint = model.client.silence.partition("\n")
         begun = model.flow.stage is not Stage.PROTOCOL
         parts = [hint, "reconnecting", *[_ALONE] * begun]
-        message = f"no daemon: {silence or 'connecting'}"
-        return Alarm(message, "; ".join(filter(None, parts)))
-    if model.disk_s > SLOW_DISK_S:
-        return Alarm(
-            f"the disk has not finished a write for {model.disk_s:.1f} s",
+        return f"no daemon: {silence or 'connecting'}\n{'; '.join(filter(None, parts))}"
+    if model.client.disk_s > SLOW_DISK_S:
+        return (
+            f"the disk has not finished a write for {model.client.disk_s:.1f} s\n"
             "nothing is lost, and an armed board has switched itself off; check whether the disk "
-            "is full, asleep or on a network, and whether another program uses the file",
+            "is full, asleep or on a network, and whether another program uses the file"
         )
     link, error = model.state.section("link"), model.state.section("error")
     if link.get("state") == "down" or (link.get("state") == "opening" and error):
         why, wait = link.get("error") or error, link.get("retry_s")
         again = f" in {float(wait):.0f} s" if wait is not None else ""
-        return Alarm(
-            f"the port is lost: {why.get('message', '')}",
-            f"reconnecting{again}; {why.get('hint') or 'check cable and power'}",
+        return (
+            f"the port is lost: {why.get('message', '')}\n"
+            f"reconnecting{again}; {why.get('hint') or 'check cable and power'}"
         )
     if error:
-        return Alarm(str(error.get("message", "")), str(error.get("hint", "")))
-    for trouble in (model.flow.trouble, model.unreadable):
-        if trouble:
-            message, _, hint = trouble.partition("\n")
-            return Alarm(message, hint)
-    return None
+        return f"{error.get('message', '')}\n{error.get('hint', '')}"
+    return model.flow.trouble or model.unreadable

@@ -110,9 +110,8 @@ def motions(
             delay = float(np.median(times - model.times(heights)))
         if model is not None:
             lowest = min(gate.height for gate in protocol.gates.on(role)) - rods.chain.length
-            struck = float(model.time[-1]) if model.hits is not None else 0.0
-            end = delay + (struck or float(model.times(np.array([lowest]))[0]))
-        falls.append(
-            ChainFall(role, rods, times, heights, model, delay, max([end, *times.tolist()]))
-        )
+            last = model.times(np.array([lowest])) if model.hits is None else model.time
+            end = delay + float(last[-1])
+        end = max([end, *times.tolist()])
+        falls.append(ChainFall(role, rods, times, heights, model, delay, end))
     return tuple(falls)

@@ -1,10 +1,11 @@
 """The next step: a common source for the page's coloured line, the footer, and Enter."""
 
+from time import monotonic
 from typing import NamedTuple
 
 from rig.campaign.machine import Stage
 from rig.text_rows import read_rows
-from rig.tui.model import Model
+from rig.tui.model import UNDER_WAY, Model
 from rig.tui.widgets.gates import label
 from rig.tui.widgets.text import duration, plain
 
@@ -18,7 +19,7 @@ class NextStep(NamedTuple):
 
 
 _HANDS = {"holding": "Hold", "placing": "Place", "hanging": "Hang"}
-_PASSING = (Stage.SETTLING, Stage.LIVE, Stage.TESTING, Stage.ARMING, Stage.FIRING, Stage.JUDGING)
+_PASSING = UNDER_WAY | {Stage.PROTOCOL}
 _STEPS = {situation: NextStep(*cells) for situation, *cells in read_rows(__file__)}
 
 
@@ -50,29 +51,22 @@ def next_step(model: Model) -> NextStep:
 def _situation(model: Model) -> str:
     """Name the situation; the device refuses to arm before all preparations are done."""
     stage, indicators = model.stage, model.indicators
-    if model.offline:
-        return "offline"
-    if stage is Stage.COUNTDOWN:
-        return stage if model.driving else "countdown elsewhere"
-    if stage in _PASSING:
-        return stage
-    if stage is Stage.PROTOCOL:
-        return stage if model.page == "protocol" else "protocol elsewhere"
-    if not model.driving and model.connected:
-        return "watching"
-    if stage is Stage.RESULT and not model.flow.logged:  # what comes next depends on it
-        return "unsaved"
-    if stage in {Stage.RESULT, Stage.DONE} and model.next_job is None:
-        return f"{stage} last"
-    if stage is not Stage.PREPARE or model.page != "run":
-        return stage
-    if not model.connected or model.state.link != "up":
-        return "no device"
-    if not indicators.known:
-        return "no gates"
-    if indicators.blocked_channels:
-        return "blocked"
-    return "moving" if indicators.restless(model.now_s) else "ready"
+    elsewhere = model.page != "protocol" if stage is Stage.PROTOCOL else not model.client.driving
+    cases = [
+        (model.offline, "offline"),
+        (elsewhere and stage in {Stage.PROTOCOL, Stage.COUNTDOWN}, f"{stage} elsewhere"),
+        (stage in _PASSING, stage),
+        (model.client.up and not model.client.driving, "watching"),
+        # What comes next depends on the verdict.
+        (stage is Stage.RESULT and not model.flow.logged, "unsaved"),
+        (stage in {Stage.RESULT, Stage.DONE} and model.next_job is None, f"{stage} last"),
+        (stage is not Stage.PREPARE or model.page != "run", stage),
+        (not model.client.up or model.state.link != "up", "no device"),
+        (not indicators.known, "no gates"),
+        (indicators.blocked_channels, "blocked"),
+        (indicators.restless(monotonic()), "moving"),
+    ]
+    return next((situation for holds, situation in cases if holds), "ready")
 
 
 def _blocked_beams(model: Model) -> str:

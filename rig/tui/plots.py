@@ -1,20 +1,15 @@
 """Plots of the screens: figures of the report, and predictions of the next fall."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 from rig.records import Job
 from rig.report.falls import fall_figures
 from rig.report.figure import Chart, Panel, PlotAxis, Trace
 from rig.report.figures import result_figure, runs_figure
 from rig.report.looks import MODEL, SECOND
+from rig.results.live import SessionView
 from rig.tui.motion import ChainFall
 from rig.tui.plotting import Picture
-
-if TYPE_CHECKING:
-    from rig.results.live import SessionView
 
 
 def pictures_of(*charts: Chart | None) -> list[Picture]:
@@ -22,9 +17,9 @@ def pictures_of(*charts: Chart | None) -> list[Picture]:
     pictures: list[Picture] = []
     for panel in (panel for chart in charts if chart is not None for panel in chart.panels):
         if panel.y.label.startswith("residual") and pictures:
-            pictures[-1] = Picture(pictures[-1].panel, panel)
+            pictures[-1] += (panel,)
         else:
-            pictures.append(Picture(panel))
+            pictures.append((panel,))
     return pictures
 
 
@@ -38,7 +33,7 @@ def fall_pictures(falls: tuple[ChainFall, ...]) -> list[Picture]:
         color = SECOND if fall.role == "free" else MODEL
         traces.append(Trace(label, times.tolist(), (100.0 * heights).tolist(), "line", color))
     time = PlotAxis("time since the release fired (s)", limits=(0.0, end_s))
-    return [Picture(Panel(time, PlotAxis("z by the model (cm)"), traces))] * bool(traces)
+    return [(Panel(time, PlotAxis("z by the model (cm)"), traces),)] * bool(traces)
 
 
 def drop_pictures(view: SessionView, job: Job) -> list[Picture]:

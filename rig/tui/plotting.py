@@ -9,23 +9,27 @@ A frame of 440 points, 120 by 34, takes 5 ms; textual-plot 0.10 takes 16 ms, and
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
 from rig.arrays import Array
 from rig.report.looks import MODEL, MUTED, SECOND
-from rig.tui.braille import COLUMNS, ROWS, Sheet, Span
+from rig.tui.braille import COLUMNS, ROWS, Rows, Sheet, Span
 
 if TYPE_CHECKING:
-    from rig.report.figure import Panel, Trace
+    from rig.report.figure import Panel, PlotAxis, Trace
 
     Numbers = Sequence[float] | Array
 
+Picture: TypeAlias = "tuple[Panel, ...]"
+"""A panel, and below it that of its residuals, if any."""
 _COLORS = ("border", "foreground", "accent", "warning", "secondary", "primary", "success", "error")
 """Colours of traces; the last is drawn above the others."""
-_COLOR_OF = {MODEL: "accent", SECOND: "secondary", MUTED: "foreground"}
+_COLOR_OF: dict[str | int, str] = {MODEL: "accent", SECOND: "secondary", MUTED: "foreground"}
+_COLOR_OF |= {"band": "border", "shade": "border", "cross": "error"}
+"""Colours of some colours and roles of the report's figures."""
 _ROLES = dict.fromkeys(("line", "dash", "thick", "level", "limit", "shade"), "⠒")
 _ROLES |= {"band": "⣿", "points": "+", "cross": "×", "mean": "●", "ring": "○", "square": "●"}
 """Marks of the roles that are drawn: of a shade its edges; of gaps, maps and words nothing."""
@@ -42,13 +46,6 @@ _SHAPES = {
 }
 """Dots of each marker around its place."""
 _CAP = np.array([[-1.0, 0.0], [1.0, 0.0]])  # cap of an error bar
-
-
-class Picture(NamedTuple):
-    """A panel, and the panel of residuals below it, if any."""
-
-    panel: Panel
-    residuals: Panel | None = None
 
 
 class CellAxis(NamedTuple):
@@ -74,7 +71,8 @@ class CellAxis(NamedTuple):
     def at(self, values: Numbers, dots: int) -> Array:
         """Return places of values in dots from the axis' start, with `dots` for a character."""
         place = np.asarray(values, dtype=np.float64) / self.unit - self.first
-        return np.clip(place, -_OUTSIDE * self.cells, _OUTSIDE * self.cells) * dots + _middle(dots)
+        furthest = _OUTSIDE * self.cells
+        return (np.clip(place, -furthest, furthest) + 0.5) * dots - 0.5
 
     def value(self, cell: float) -> float:
         """Return the value in the middle of a character."""
@@ -87,10 +85,6 @@ class CellAxis(NamedTuple):
         return {
             cell: float(f"{self.value(cell):.9g}") for cell in range(begin, self.cells, self.every)
         }
-
-
-def _middle(dots: int) -> float:
-    return 0.5 * (dots - 1)
 
 
 def axis_over(low: float, high: float, cells: int, least: int, *, whole: bool = False) -> CellAxis:
@@ -121,53 +115,68 @@ def axis_over(low: float, high: float, cells: int, least: int, *, whole: bool = 
     return min(fitting, key=lambda axis: (len(axis.ticks) < 3, axis.unit), default=bare)
 
 
-def draw_picture(
-    picture: Picture, width: int, height: int, moment: float | None = None
-) -> list[list[Span]]:
-    """Return a drawn picture, a list of spans for each line.
+def draw_picture(picture: Picture, moment: float | None, width: int, height: int) -> Rows:
+    """Return a drawn picture.
 
     Parameters
     ----------
-    width, height
-        Size in characters.
     moment
         Time of a vertical line, s; `None` for no line.
+    width, height
+        Size in characters.
     """
-    panel, residuals = picture
-    if residuals is None or height < _STRIP_FROM:
-        residuals, strip = None, 0
-    else:
-        strip = max(_STRIP_LEAST, height // _STRIP_OF)
+    panel, *residuals = panels = picture[: 1 + (height >= _STRIP_FROM)]
+    strip = max(_STRIP_LEAST, height // _STRIP_OF) * len(residuals)
     rows = max(1, height - 3 - strip)
-    upright = axis_over(*_roomy(panel), rows, min(_TICK_ROWS, max(1, rows // 3)))
-    lower = axis_over(*_roomy(residuals or panel), max(1, strip - 1), 1)
-    numbers = [*upright.ticks.values(), *(lower.ticks.values() if strip else ())]
-    margin = 1 + max((len(_number(value)) for value in numbers), default=0)
+    sizes = (rows, min(_TICK_ROWS, max(1, rows // 3))), (strip - 1, 1)
+    scales = [axis_over(*_heights(part), *size) for part, size in zip(panels, sizes, strict=False)]
+    numbers = [_number(value) for y in scales for value in y.ticks.values()]
+    margin = 1 + max(map(len, numbers), default=0)
     columns = max(1, width - margin - 1)
-    x = axis_over(*_spread(panel), columns, _TICK_COLUMNS, whole=panel.whole)
-    out = [_legend(panel, width), *_drawn(panel, x, upright, moment, margin)]
-    if residuals is not None:
-        head = f" {_one_line(residuals.y.label)} "[:columns]
-        out.append([Span(" " * margin + "├" + head + "╌" * (columns - len(head)))])
-        out += _drawn(residuals, x, lower, moment, margin)
+    ends = _limits(panel.x, ((trace.x, 0.5 * panel.whole) for trace in panel.series), 0.0)
+    x = axis_over(*ends, columns, _TICK_COLUMNS, whole=panel.whole)
+    out = [_legend(panel, width)]
+    for part, y in zip(panels, scales, strict=True):
+        if part is not panel:
+            head = f" {part.y.label} ".replace("\n", " ")[:columns]
+            out.append([Span(" " * margin + "├" + head + "╌" * (columns - len(head)))])
+        out += _drawn(part, x, y, moment, margin)
     return [*out, *_foot(panel.x.label, x, margin)]
 
 
-def _spread(panel: Panel) -> tuple[float, float]:
-    """Return the horizontal limits of a panel, or those of its data."""
-    x = panel.x
-    places = [place for trace in panel.series for place in trace.x] or [0.0]
-    low, high = x.limits or (min(places) - 0.5 * panel.whole, max(places) + 0.5 * panel.whole)
-    return (low, high) if low < high else (low - 0.5, low + 0.5)
+def _heights(panel: Panel) -> tuple[float, float]:
+    """Return the vertical limits, with margins around the bars of the data."""
+    drawn = [trace for trace in panel.series if trace.role in _ROLES]
+    return _limits(panel.y, ((each.y, each.u if len(each.u) else 0.0) for each in drawn), _ROOM)
 
 
-def _one_line(label: str) -> str:
-    return label.replace("\n", " ")
+def _limits(
+    axis: PlotAxis, bars: Iterable[tuple[Numbers, Numbers | float]], share: float
+) -> tuple[float, float]:
+    """Return the limits of an axis, or those of its data, and a span if all are equal.
+
+    Parameters
+    ----------
+    bars
+        Values, and how far each reaches to both sides.
+    share
+        Share of the span left empty beyond both ends.
+    """
+    ends = [np.asarray(axis.limits or (), dtype=np.float64)]
+    for values, off in () if axis.limits else bars:
+        ends += [np.subtract(values, off), np.add(values, off)]
+    places = np.concatenate(ends)
+    places = places[np.isfinite(places)]
+    if not places.size:
+        return 0.0, 1.0
+    low, high = float(places.min()), float(places.max())
+    room = share * (high - low) if low < high else 0.5 * abs(high) or 0.5
+    return low - room, high + room
 
 
 def _legend(panel: Panel, width: int) -> list[Span]:
     """Return the legend of a panel."""
-    spans, used = [Span(_one_line(panel.y.label)[:width], bold=True)], len(panel.y.label)
+    spans, used = [Span(panel.y.label.replace("\n", " ")[:width], bold=True)], len(panel.y.label)
     for trace in panel.series:
         used += len(trace.label) + 4
         if trace.label and trace.role in _ROLES and len(trace.y) and used <= width:
@@ -177,9 +186,7 @@ def _legend(panel: Panel, width: int) -> list[Span]:
 
 
 def _color(trace: Trace) -> str:
-    if trace.role in {"band", "shade", "cross"}:
-        return "error" if trace.role == "cross" else "border"
-    return _COLOR_OF.get(trace.color, "primary")
+    return _COLOR_OF.get(trace.role) or _COLOR_OF.get(trace.color, "primary")
 
 
 def _number(value: float) -> str:
@@ -193,7 +200,7 @@ def _drawn(
     sheet = Sheet(x.cells, y.cells, _COLORS)
     if moment is not None and "time" in panel.x.label:
         down = np.arange(0, ROWS * y.cells, 2.0)
-        across = np.full(down.size, float(x.at([moment], COLUMNS)[0]))
+        across = x.at([moment] * down.size, COLUMNS)
         sheet.dots(np.column_stack([across, down]), 1)
     for trace in panel.series:
         if trace.role in _ROLES and len(trace.y):
@@ -239,19 +246,3 @@ def _foot(label: str, axis: CellAxis, margin: int) -> Iterator[list[Span]]:
     line[axis.cells - len(name) :] = name
     yield [Span(" " * margin + "└" + "".join(line))]
     yield [Span("".join(below))]
-
-
-def _roomy(panel: Panel) -> tuple[float, float]:
-    """Return the vertical limits with margins, and a span if all values are equal."""
-    ends = [np.asarray(panel.y.limits or (), dtype=np.float64)]
-    for trace in panel.series if not panel.y.limits else ():
-        values = np.asarray(trace.y, dtype=np.float64)
-        off = np.asarray(trace.u, dtype=np.float64) if len(trace.u) else 0.0
-        ends += [values - off, values + off] if trace.role in _ROLES else []
-    values = np.concatenate(ends)
-    values = values[np.isfinite(values)]
-    if not values.size:
-        return 0.0, 1.0
-    bottom, top = float(values.min()), float(values.max())
-    room = _ROOM * (top - bottom) or 0.5 * abs(top) or 0.5
-    return bottom - room, top + room

@@ -42,7 +42,7 @@ class Player:
 
     def other(self, by: int, count: int) -> Player:
         """Return the replay of another drop, from its beginning."""
-        return replace(self, at=(self.at + by) % max(1, count), time_s=0.0)
+        return replace(self, at=(self.at + by) % count, time_s=0.0)
 
     def toggle_play(self, end_s: float) -> Player:
         """Return the replay started or paused; from the beginning if it is at the end."""

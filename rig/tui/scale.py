@@ -8,14 +8,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import numpy as np
 
 from rig.protocol.contact import of_run
-from rig.protocol.protocol import Protocol, RodChain, Run
-from rig.tui.braille import COLUMNS, ROWS, Sheet, Span
-from rig.tui.indicators import Indicators
+from rig.protocol.protocol import Protocol, Run
+from rig.tui.braille import COLUMNS, ROWS, Rows, Sheet, Span
 
 if TYPE_CHECKING:
     from rig.tui.motion import ChainFall
@@ -27,14 +26,8 @@ _CORNERS = 17  # corners of a circle
 _COLORS = ("border", "foreground", "accent", "primary", "secondary", "success", "warning")
 
 
-class Stroke(NamedTuple):
-    """A straight line between two points, m, in a colour of the theme."""
-
-    x: float
-    z: float
-    to_x: float
-    to_z: float
-    color: str
+Stroke: TypeAlias = tuple[float, float, float, float, str]
+"""A straight line between two points, x before z, m, and its colour of the theme."""
 
 
 class Lamp(NamedTuple):
@@ -52,17 +45,17 @@ class Drawing(NamedTuple):
     `middles` are those of the sides; `apart_m` is Δz if measured so far.
     """
 
-    strokes: tuple[Stroke, ...]
+    strokes: Sequence[Stroke]
     width_m: float
     bottom_m: float
     top_m: float
     apart_m: float | None = None
-    lamps: tuple[Lamp, ...] = ()
-    middles: tuple[float, ...] = ()
+    lamps: Sequence[Lamp] = ()
+    middles: Sequence[float] = ()
 
 
 def drawing(
-    protocol: Protocol, run: Run, falls: Sequence[ChainFall], indicators: Indicators, time_s: float
+    protocol: Protocol, run: Run, falls: Sequence[ChainFall], blocked: Sequence[int], time_s: float
 ) -> Drawing:
     """Return the measured chains over those of the model, between the posts of their gates.
 
@@ -70,15 +63,15 @@ def drawing(
     ----------
     falls
         Falls from `rig.tui.motion.motions`.
-    indicators
-        State of the gates at that time; blocked gates are highlighted.
+    blocked
+        Channels of the gates that are blocked at that time, which are highlighted.
     time_s
         Time since the release fired, s.
     """
     protocol = of_run(protocol, run)
     strokes: list[Stroke] = []
     lamps: list[Lamp] = []
-    pitch = 2.4 * max((_rod_m(fall.rods) for fall in falls), default=_WIDTH_M)
+    pitch = 2.4 * max((fall.rods.rod_length or _WIDTH_M for fall in falls), default=_WIDTH_M)
     half, length = 0.5 * pitch, max((fall.length for fall in falls), default=0.0)
     heights = [gate.height for gate in protocol.gates.gates] or [0.0]
     low, high = min(heights) - _MARGIN_M, max(heights) + _MARGIN_M
@@ -88,12 +81,12 @@ def drawing(
     middles = [pitch * (2.0 * column + 1.2) for column in range(len(falls))]
     for middle, fall in zip(middles, falls, strict=True):
         left, right = middle - half, middle + half
-        strokes += [Stroke(x, low, x, high, "border") for x in (left, right)]
+        strokes += [(x, low, x, high, "border") for x in (left, right)]
         for gate in protocol.gates.on(fall.role):
-            lit = gate.channel in indicators.blocked_channels
+            lit = gate.channel in blocked
             lamps.append(Lamp(gate.channel, left, gate.height, lit))
             end, color = (right, "warning") if lit else (left + 0.2 * half, "foreground")
-            strokes.append(Stroke(left, gate.height, end, gate.height, color))
+            strokes.append((left, gate.height, end, gate.height, color))
         expected, measured = fall.model_height(time_s), fall.measured_height(time_s)
         seen = expected if measured is None and fall.times.size else measured
         own = "primary" if fall.role == "impact" else "secondary"
@@ -102,7 +95,7 @@ def drawing(
                 strokes += _rods(protocol, fall, middle, height, color, top - bottom)
         if fall.role == "impact":
             fallen = half * math.tan(math.radians(run.incline_deg))
-            strokes.append(Stroke(left, fallen, right, -fallen, "foreground"))
+            strokes.append((left, fallen, right, -fallen, "foreground"))
     width = pitch * (2.0 * max(1, len(falls)) + 0.4)
     # Δz is known while both chains pass gates.
     until_s = min([time_s, *(float(fall.times[-1]) for fall in falls if fall.times.size)])
@@ -110,12 +103,12 @@ def drawing(
     apart_m = None
     if len(tops) > 1:
         at, apart_m = 2.2 * pitch, tops[1] - tops[0]
-        strokes.append(Stroke(at, tops[0], at, tops[1], "success"))
-        strokes += [Stroke(at - 0.03, z, at + 0.03, z, "success") for z in tops]
-    return Drawing(tuple(strokes), width, bottom, top, apart_m, tuple(lamps), tuple(middles))
+        strokes.append((at, tops[0], at, tops[1], "success"))
+        strokes += [(at - 0.03, z, at + 0.03, z, "success") for z in tops]
+    return Drawing(strokes, width, bottom, top, apart_m, lamps, middles)
 
 
-def paint(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
+def paint(drawing: Drawing, width: int, height: int) -> Rows:
     """Return the drawing in columns and lines of characters, with words in the last line.
 
     Dots are square.
@@ -134,18 +127,14 @@ def paint(drawing: Drawing, width: int, height: int) -> list[list[Span]]:
         text = ",".join(str(lamp.channel) for lamp in near) + "○●"[lit]
         color = "warning" if lit else "foreground"
         sheet.write(row, max(0, column - len(text)), Span(text, color, bold=lit))
-    ends = np.array([[(s.x, s.z), (s.to_x, s.to_z)] for s in strokes]).reshape(-1, 2, 2)
-    inks = [_COLORS.index(stroke.color) for stroke in strokes]
+    ends = np.array([places for *places, _ in strokes]).reshape(-1, 2, 2)
+    inks = [_COLORS.index(color) for *_, color in strokes]
     sheet.strokes(scale * (np.array([left, top]) + ends * [1.0, -1.0]), inks)
     apart = "" if apart_m is None else f"  Δz {apart_m * 1e2:.1f} cm as it falls"
-    measured = {"primary", "secondary"} & {stroke.color for stroke in strokes}
+    measured = {"primary", "secondary"} & {color for *_, color in strokes}
     behind = Span(" behind measured" * bool(measured))
     words = [Span("model", "accent"), behind, Span(apart, "success", bold=True)]
     return [*sheet.rows(), words]
-
-
-def _rod_m(rods: RodChain) -> float:
-    return rods.rod_length or _WIDTH_M
 
 
 def _rods(
@@ -153,14 +142,12 @@ def _rods(
 ) -> Iterator[Stroke]:
     """Yield rods and strings, with struck rods at the contact point, or a round object."""
     rods = fall.rods
-    half = 0.5 * _rod_m(rods)
+    half = 0.5 * (rods.rod_length or _WIDTH_M)
     if protocol.vocabulary.part == "object":
         radius = max(0.5 * rods.widths[0], _BALL * shown_m)
-        around = [
-            (x + radius * math.cos(angle), height + radius * math.sin(angle))
-            for angle in np.linspace(0.0, 2.0 * math.pi, _CORNERS)
-        ]
-        yield from (Stroke(*start, *end, color) for start, end in pairwise(around))
+        angles = np.linspace(0.0, 2.0 * math.pi, _CORNERS)
+        around = np.column_stack([x + radius * np.cos(angles), height + radius * np.sin(angles)])
+        yield from ((*start, *end, color) for start, end in pairwise(around.tolist()))
         return
     lies = fall.role == "impact" and protocol.surface is not None
     for number, place in enumerate(rods.chain.heights):
@@ -169,4 +156,4 @@ def _rods(
         if lies and z < 0.0:
             z, tilt = 0.0, 0.0
         across, up = half * math.cos(tilt), half * math.sin(tilt)
-        yield Stroke(x - across, z - up, x + across, z + up, color)
+        yield x - across, z - up, x + across, z + up, color

@@ -58,13 +58,6 @@ class DaemonState:
         return None if mask is None else int(mask)
 
     @property
-    def simulated(self) -> bool:
-        """Whether port or session is simulated."""
-        return bool(
-            self.section("port").get("simulated") or self.section("session").get("simulated")
-        )
-
-    @property
     def holder(self) -> str | None:
         """Name of the client that has control."""
         name = self.section("control").get("client")

@@ -4,8 +4,8 @@ It needs more of the program than the first paint, so it is loaded when a survey
 """
 
 from collections.abc import Iterator
-from contextlib import suppress
 from functools import lru_cache
+from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,9 +18,11 @@ from rig.results.whole import protocol_of
 from rig.session.store import Session
 from rig.text_rows import read_rows
 from rig.tui.beginnings import HERE, Beginning
+from rig.tui.client import ReconnectingClient
 from rig.tui.context import Options
 from rig.usb.listing import serial_ports
 
+_BOARD = "Connect a board"
 _MOST = 200
 """Number of session files listed, the newest first."""
 
@@ -47,16 +49,8 @@ class SessionEntry(NamedTuple):
     trouble: str = ""
 
 
-def look_around(options: Options, port: str, other: str) -> list[Beginning]:
-    """Return the rows of the home page from the folder, ready protocols and USB devices.
-
-    Parameters
-    ----------
-    port
-        Port of the connected rig; empty for none.
-    other
-        Port of a daemon that blocks the wanted one; empty for none.
-    """
+def look_around(options: Options, client: ReconnectingClient) -> list[Beginning]:
+    """Return the rows of the home page from the folder, ready protocols and USB devices."""
     ready = [*ready_protocols().values()]
     own = [*options.files, *sorted(Path().glob("[!.]*.yaml"))]
     files = [*{path.resolve(): path for path in own if path.resolve() not in ready}.values()]
@@ -65,55 +59,46 @@ def look_around(options: Options, port: str, other: str) -> list[Beginning]:
         Beginning(section, kind, title, named.get(f"{name}.yaml"), value)
         for section, kind, name, value, title in read_rows(__file__)
     ]
-    boards = [*_boards()]
-    if other:
-        boards.append(Beginning("Connect a board", "end", f"end {other}, which runs already"))
-    if not boards and not port:
-        boards.append(Beginning("Connect a board", "board", "none is plugged in"))
+    boards = [*_boards(client)]
+    if not boards and not client.port:
+        boards.append(Beginning(_BOARD, "board", "none is plugged in"))
     sessions = session_list(Path())
-    going = [
-        Beginning(
-            "Continue",
-            "open",
-            f"{entry.title or entry.path.stem:.24}, {entry.over} of {entry.runs}",
-            named[entry.source],
-            "sim://" * entry.simulated,
-            entry.path,
-        )
-        for entry in sessions
-        if entry.over < entry.runs and entry.source in named
-    ]
+    readable = [entry for entry in sessions if not entry.trouble] or sessions
     return [
         *(row for row in scenes if row.kind == "try"),
         *boards,
-        *going[:3],
+        *islice(_unfinished(sessions, named), 3),
         *(Beginning(HERE, "open", path.stem, path) for path in files),
         *(row for row in scenes if row.kind == "new"),
-        *(
-            Beginning("Open results", "results", f"of {entry.path.stem}")
-            for entry in sorted(sessions, key=lambda entry: bool(entry.trouble))[:1]
-        ),
+        *(Beginning("Open results", "results", f"of {each.path.stem}") for each in readable[:1]),
         *(Beginning("Ready experiments", "open", path.stem, path) for path in ready),
     ]
 
 
-def _boards() -> Iterator[Beginning]:
+def _unfinished(sessions: list[SessionEntry], named: dict[str, Path]) -> Iterator[Beginning]:
+    for entry in sessions:
+        if entry.over < entry.runs and entry.source in named:
+            title = f"{entry.title or entry.path.stem:.24}, {entry.over} of {entry.runs}"
+            file, port = named[entry.source], "sim://" * entry.simulated
+            yield Beginning("Continue", "open", title, file, port, entry.path)
+
+
+def _boards(client: ReconnectingClient) -> Iterator[Beginning]:
     for _ in waiting_drives():
-        title = "Pico: put the firmware on it"
-        yield Beginning("Connect a board", "flash", title, value="pico")
+        yield Beginning(_BOARD, "flash", "Pico: put the firmware on it", value="pico")
     for port in serial_ports():
         if port.candidate:
-            title = f"{port.kind} at {port.path}"
-            yield Beginning("Connect a board", "board", title, value=port.path)
+            yield Beginning(_BOARD, "board", f"{port.kind} at {port.path}", value=port.path)
+    if client.in_the_way is not None:
+        yield Beginning(_BOARD, "end", f"end {client.in_the_way[0]}, which runs already")
 
 
 def session_list(folder: Path) -> list[SessionEntry]:
     """Return the sessions of a folder, the newest first."""
-    dated = []
-    for path in folder.glob("*.session"):
-        with suppress(OSError):  # removed meanwhile
-            dated.append((path.stat().st_mtime_ns, path))
-    return [_look(path, file_stamp(path)) for _, path in sorted(dated, reverse=True)[:_MOST]]
+    stamps = ((file_stamp(path), path) for path in folder.glob("*.session"))
+    # A file that was removed meanwhile has none.
+    dated = sorted(((stamp[0][1], path, stamp) for stamp, path in stamps if stamp), reverse=True)
+    return [_look(path, stamp) for _, path, stamp in dated[:_MOST]]
 
 
 @lru_cache(maxsize=_MOST)  # the home page lists them repeatedly

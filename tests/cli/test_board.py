@@ -15,7 +15,6 @@ from rig.board.page import BoardPage
 from rig.daemon.client import Client, Line
 from rig.ready import ready_protocol
 from rig.results.live import LiveAnalysis
-from rig.tui.indicators import Indicators
 from rig.tui.motion import motions
 from rig.tui.scale import drawing
 from tests.cli.lab import command
@@ -136,7 +135,7 @@ def test_a_session_is_shown_in_words_and_pictures_until_another_is_open(tmp_path
     job = view.jobs[-1]
     drop = view.drops[job], view.scales[job].hz, view.results[job]
     run = view.plan[job.run]
-    moved = drawing(view.protocol, run, motions(view.protocol, run, drop), Indicators(), 1.0)
+    moved = drawing(view.protocol, run, motions(view.protocol, run, drop), (), 1.0)
     assert picture["apart_cm"][-1] == round(1e2 * moved.apart_m, 1), "the terminal has another Δz"
     armed = page.look(news | {"drop": {"run": 2, "attempt": 1, "state": "armed"}})
     assert re.search(r"Run 2 of 4 .* is armed", armed)

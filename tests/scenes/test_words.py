@@ -121,11 +121,11 @@ def test_dialogs_speak_the_words_of_their_scene(recorded, monkeypatch):
         app.follower.look_with(live)
         texts = {}
         async with app.run_test(size=(120, 60)) as pilot:
-            while app.follower.view is None or not app.page:
+            while app.model.view is None or not app.model.page:
                 await pilot.pause(0.02)
             for name in DIALOGS:
                 stage = Stage.PREPARE if name == "release_test" else Stage.RESULT
-                app.driver.flow = Flow(stage, Job(*job), verdict="accepted")
+                app.model.flow = Flow(stage, Job(*job), verdict="accepted")
                 app.action_do(name)
                 while len(app.screen_stack) == 1:
                     await pilot.pause(0.02)

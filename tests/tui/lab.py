@@ -74,7 +74,7 @@ class Operator:
         """Wait for something to become true on the screen or behind it."""
         end = time.monotonic() + PATIENCE_S
         while not (await found if isawaitable(found := true()) else found):
-            assert time.monotonic() < end, f"{self.app.flow}\n{text_of(self.app)}"
+            assert time.monotonic() < end, f"{self.app.model.flow}\n{text_of(self.app)}"
             await self.pilot.pause(0.05)
 
     async def play(self, name: str) -> None:
@@ -99,15 +99,15 @@ class Operator:
         await self.until(lambda: self._pressed("enter", lambda: len(self.app.screen_stack) == 1))
 
     async def at(self, stage: Stage | str) -> None:
-        await self.until(lambda: self.app.flow.stage is _stage(stage))
+        await self.until(lambda: self.app.model.flow.stage is _stage(stage))
 
     async def arm(self, stage: Stage | str) -> None:
         """Arm, and again where a busy machine let board or daemon wait too long, until `stage`."""
 
         async def there() -> bool:
-            if self.app.flow.stage is Stage.PREPARE:
+            if self.app.model.flow.stage is Stage.PREPARE:
                 await self.press("enter")
-            return self.app.flow.stage is _stage(stage)
+            return self.app.model.flow.stage is _stage(stage)
 
         await self.until(there)
 
@@ -127,7 +127,7 @@ class Operator:
         await self.until(lambda: self.app.client and self.app.client.driving)
 
     async def verdict(self, word: str) -> None:
-        await self.until(lambda: self.app.flow.verdict == word and self.app.flow.logged)
+        await self.until(lambda: self.app.model.flow.verdict == word and self.app.model.flow.logged)
 
     async def see(self, *texts: str) -> None:
         """Wait until all of these stand on the screen, however lines are broken."""
@@ -136,7 +136,7 @@ class Operator:
     async def keep(self, *texts: str) -> None:
         """See texts, and wait until the session has what they say."""
         await self.see(*texts)
-        await self.until(lambda: self.app.flow.logged)
+        await self.until(lambda: self.app.model.flow.logged)
 
 
 def _stage(stage: Stage | str) -> Stage:
@@ -245,7 +245,7 @@ class Lab:
         named = {"name": name} if name else {}
         async with at_screen(options, size, patience_s=self.patience_s, **named) as operator:
             client = operator.app.client
-            await operator.until(lambda: operator.app.page)
+            await operator.until(lambda: operator.app.model.page)
             yield operator
             if client.daemon:
                 self.daemons.append(client.daemon)
@@ -268,7 +268,7 @@ async def session_on(op: Operator) -> None:
     await op.drive()
     await op.press("enter")
     await op.at(Stage.DEVICE)
-    await op.until(lambda: op.app.follower.view and op.app.follower.indicators.known)
+    await op.until(lambda: op.app.model.view and op.app.model.indicators.known)
 
 
 def unseen(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -289,7 +289,7 @@ def unseen(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def draw_without_pause(monkeypatch: pytest.MonkeyPatch) -> None:
     """Have figures drawn as soon as their data are there, and looked at as soon."""
-    for module in ("rig.tui.widgets.figure", "bench.pictures"):
+    for module in ("rig.tui.widgets.spans", "bench.pictures"):
         monkeypatch.setattr(f"{module}.PAUSE_S", 0.05)
 
 

@@ -43,9 +43,9 @@ async def test_stop_is_asked_for_until_it_is_known_that_all_is_off(lab, monkeypa
         await op.until(lambda: len(op.app.screen_stack) == 2)
         async with listening(op) as called:
             await op.press("f9")
-            await op.until(lambda: op.app.driver.stop.heard is False)
+            await op.until(lambda: op.app.model.stop.heard is False)
             assert "stop answered" not in called
-            await op.until(lambda: op.app.driver.stop.heard)
+            await op.until(lambda: op.app.model.stop.heard)
         assert "stop answered" in called
 
 
@@ -55,8 +55,8 @@ async def test_stop_works_in_every_state_that_lasts(lab):
 
     async with lab.ready(countdown_s=600.0) as op:
         await op.play("stop in every state that lasts")
-        await op.until(lambda: op.app.follower.state.phase == "idle")
-        op.app.driver.flow = op.app.flow._replace(countdown_s=0.1)
+        await op.until(lambda: op.app.model.state.phase == "idle")
+        op.app.model.flow = op.app.model.flow._replace(countdown_s=0.1)
         await op.arm(Stage.LIVE)
         await op.stop("escape")
         await op.at(Stage.RESULT)  # what there is is kept and judged
@@ -72,6 +72,6 @@ async def test_the_release_is_tried_only_after_a_yes_and_is_no_run(lab):
             await op.play("the release is not tried")
             assert not called
         await op.play("the release is tried")
-        assert op.app.page == "device"
+        assert op.app.model.page == "device"
         await op.play("the run is still to come")
-        assert {line.state for line in op.app.follower.state.runs} == {"planned"}
+        assert {line.state for line in op.app.model.state.runs} == {"planned"}

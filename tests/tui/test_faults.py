@@ -26,14 +26,14 @@ async def test_a_daemon_that_hangs_while_armed_is_said_and_is_not_armed_when_it_
         os.kill(lab.daemons[0].pid, signal.SIGSTOP)
         try:
             await op.see("no daemon: no answer for", "an armed board has switched itself off")
-            assert op.app.flow.stage is Stage.PREPARE
+            assert op.app.model.flow.stage is Stage.PREPARE
             await op.press("f9")
             await op.see("STOP NOT CONFIRMED: switch the release's supply off")
         finally:
             os.kill(lab.daemons[0].pid, signal.SIGCONT)
         await op.see("the daemon was lost before the release: nothing fell")
-        await op.until(lambda: op.app.follower.state.line(1).state == "interrupted")
-        await op.until(lambda: op.app.follower.state.phase == "idle")
+        await op.until(lambda: op.app.model.state.line(1).state == "interrupted")
+        await op.until(lambda: op.app.model.state.phase == "idle")
 
 
 async def test_a_disk_that_takes_nothing_is_said(lab):
@@ -54,7 +54,7 @@ async def test_a_wrong_protocol_is_located_and_read_again_when_it_is_mended(lab,
         await op.press("enter")
         lab.protocol.write_text(good, "utf-8")
         await op.see("mended")
-        assert op.app.flow.stage is Stage.PROTOCOL
+        assert op.app.model.flow.stage is Stage.PROTOCOL
 
 
 async def test_a_daemon_of_another_port_is_named(lab):
@@ -80,19 +80,19 @@ def kill(processes, lab):
 
 
 async def mended(op):
-    await op.until(lambda: op.app.follower.state.link == "up" and op.app.client.driving)
-    await op.until(lambda: op.app.follower.state.section("session"))
+    await op.until(lambda: op.app.model.state.link == "up" and op.app.client.driving)
+    await op.until(lambda: op.app.model.state.section("session"))
 
 
 async def test_a_pulled_cable_is_said_on_every_screen(cabled):
     processes, lab = cabled
 
     async with lab.operator(countdown_s=0.1) as op:
-        await op.until(lambda: op.app.follower.state.link == "up")
+        await op.until(lambda: op.app.model.state.link == "up")
         pull(processes, lab)  # before there is a session
         await op.see(*PULLED, "HOME")
         plug(processes)
-        await op.until(lambda: op.app.follower.state.link == "up")
+        await op.until(lambda: op.app.model.state.link == "up")
         await session_on(op)
         pull(processes, lab)
         for page in "123456":
@@ -105,7 +105,7 @@ async def test_a_pulled_cable_is_said_on_every_screen(cabled):
         await op.arm(Stage.RESULT)
         pull(processes, lab)
         await op.see(*PULLED, "RESULT")
-        assert op.app.flow.verdict == "accepted"  # stays until it is acknowledged
+        assert op.app.model.flow.verdict == "accepted"  # stays until it is acknowledged
 
 
 @pytest.mark.parametrize("fault", [pull, kill])
@@ -114,11 +114,11 @@ def test_a_drop_that_falls_without_its_line_is_found_when_it_is_back(cabled, fau
 
     async def work():
         async with lab.operator(countdown_s=0.1) as op:
-            await op.until(lambda: op.app.follower.state.link == "up")
+            await op.until(lambda: op.app.model.state.link == "up")
             await session_on(op)
             await op.press("enter")
             await op.arm(Stage.LIVE)
-            job = op.app.flow.job
+            job = op.app.model.flow.job
             await asyncio.to_thread(fault, processes, lab)
             if fault is pull:
                 await op.see("the port is lost")

@@ -33,7 +33,7 @@ async def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(folder,
         await op.pilot.pause(0.3)
         assert "✗" not in flat(app)
         assert "supply" not in flat(app)
-        assert app.driver.stop is None
+        assert app.model.stop is None
 
         async def press(key):
             pressed.append(key)
@@ -42,9 +42,7 @@ async def test_a_first_g_takes_at_most_four_keys_and_what_was_begun_ends(folder,
         app.desk.rows = []  # as before it has looked around
         await press("enter")
         await op.at(Stage.DEVICE)
-        await op.until(
-            lambda: app.follower.view and app.follower.indicators.known and app.client.driving
-        )
+        await op.until(lambda: app.model.view and app.model.indicators.known and app.client.driving)
         await press("enter")
         await op.at(Stage.PREPARE)
         await op.see("Run 1 of 10", "Enter arms")

@@ -84,10 +84,10 @@ async def _screens(moment, sizes, path, look, themes=THEME_NAMES[:1]):
     whole = state_of(LiveAnalysis(path).read())
     state = replace(whole, sections={**QUIET, **more, "session": whole.sections["session"]})
     app = RigApp(Options(session=path), KEYS, FakeClient(state))
-    app.driver.flow = flow_of(**row)
+    app.model.flow = flow_of(**row)
     found = []
     async with app.run_test(size=sizes[0]) as pilot:
-        while app.follower.view is None or not app.follower.indicators.known:
+        while app.model.view is None or not app.model.indicators.known:
             await pilot.pause()
         if moment == "help":
             await pilot.press("question_mark")

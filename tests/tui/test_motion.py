@@ -15,7 +15,7 @@ from rig.report.figure import Panel, PlotAxis, Trace
 from rig.report.looks import MODEL
 from rig.tui.braille import dots_of
 from rig.tui.motion import motions
-from rig.tui.plotting import Picture, axis_over, draw_picture
+from rig.tui.plotting import axis_over, draw_picture
 from rig.tui.replay import FASTEST, SLOWEST, Player, end_of, indicators_at, until
 from sim.dials import Dials
 from tests.analysis.drops import case
@@ -70,7 +70,7 @@ WIDTH, HEIGHT = 44, 20
 
 def drawn(*traces):
     panel = Panel(PlotAxis("time (s)"), PlotAxis("z\n(cm)"), traces)
-    return draw_picture(Picture(panel, None), WIDTH, HEIGHT, None)
+    return draw_picture((panel,), None, WIDTH, HEIGHT)
 
 
 def drawn_dots(plot, color=None):

@@ -14,9 +14,9 @@ async def test_a_drop_is_rejected_with_a_cause_and_noted(lab):
 
     async with lab.ready() as op:
         op.app.options = replace(op.app.options, bell=True)
-        op.app.bell = lambda: rung.append(op.app.flow.stage)
+        op.app.bell = lambda: rung.append(op.app.model.flow.stage)
         await op.arm(Stage.RESULT)
-        await op.until(lambda: op.app.flow.logged and rung)
+        await op.until(lambda: op.app.model.flow.logged and rung)
         await op.play("a drop is noted")
         assert rung == [Stage.RESULT]
         await op.play("it is rejected with a cause, and taken back")
@@ -44,26 +44,26 @@ async def test_a_blind_session_shows_its_numbers_when_it_is_unblinded(lab):
     async with lab.ready() as op:
         await op.arm(Stage.RESULT)
         await op.see("BLIND: results are hidden", "ACCEPTED")
-        assert op.app.follower.state.edges == ()
+        assert op.app.model.state.edges == ()
         for page in "4356":
             await op.press(page)
-            await op.until(lambda page=page: op.app.action_of[page] == f"page_{op.app.page}")
+            await op.until(lambda page=page: op.app.action_of[page] == f"page_{op.app.model.page}")
             assert "± 0" not in text_of(op.app)
-            assert not op.app.follower.view.drops[op.app.follower.view.jobs[0]].edges
+            assert not op.app.model.view.drops[op.app.model.view.jobs[0]].edges
         await op.keep()
         await op.play("it is unblinded")
 
 
 async def test_a_second_screen_watches_and_can_only_stop(lab):
     async with lab.ready(countdown_s=600.0) as op, lab.operator(name="the other") as other:
-        await other.until(lambda: other.app.follower.view)
+        await other.until(lambda: other.app.model.view)
         assert not other.app.client.driving
         await op.arm(Stage.COUNTDOWN)
         await other.play("a second screen watches")
-        assert op.app.flow.stage is Stage.COUNTDOWN
+        assert op.app.model.flow.stage is Stage.COUNTDOWN
         await other.press("f9")
-        await op.until(lambda: op.app.follower.state.line(1).state == "interrupted")
+        await op.until(lambda: op.app.model.state.line(1).state == "interrupted")
         await op.play("the first gives control back")
-        await other.until(lambda: other.app.follower.state.holder is None)
+        await other.until(lambda: other.app.model.state.holder is None)
         await other.press("c")
         await other.drive()

@@ -87,7 +87,7 @@ class Hands:
         """
         if not self.app._open():
             return  # it was left, on purpose
-        now = self.app.page, self.app.flow.stage, len(self.app.screen_stack)
+        now = self.app.model.page, self.app.model.flow.stage, len(self.app.screen_stack)
         if now != self.faces[-1][1]:
             self.faces.append((self.looked, now))
         self.looked = time.monotonic()
@@ -180,7 +180,7 @@ async def _typed(session, lived):
                 break
             while len(app.screen_stack) > 1:
                 app.screen.dismiss(None)
-            app.driver.flow = MOMENTS[moment]._replace(ticket=app.flow.ticket + 1)
+            app.model.flow = MOMENTS[moment]._replace(ticket=app.model.flow.ticket + 1)
             await pilot.pause(0.12)  # its page is there, unless another one was turned to
             if dialog:
                 await hands.key(dialog)
@@ -202,10 +202,10 @@ async def test_a_key_that_comes_back_from_its_field_after_the_end_is_dropped(ses
 async def test_stop_is_on_its_way_within_a_tenth_of_a_second(session):
     async with _screen(session) as (app, pilot):
         for moment, flow in MOMENTS.items():
-            app.driver.flow = flow._replace(ticket=app.flow.ticket + 1)
+            app.model.flow = flow._replace(ticket=app.model.flow.ticket + 1)
             end = time.monotonic() + PATIENCE_S
-            while app._open() and app.page != PAGE_OF.get(moment, "run"):
-                assert time.monotonic() < end, app.page
+            while app._open() and app.model.page != PAGE_OF.get(moment, "run"):
+                assert time.monotonic() < end, app.model.page
                 await pilot.pause(0.01)
             await pilot.pause(0.12)  # it is drawn
             while (waited := await _stopped(app, pilot)) > 0.1:  # for other programs' sake
@@ -230,6 +230,6 @@ async def _screen(session):
     app = RigApp(Options(session=session, countdown_s=0.3, still_s=STILL_S), KEYS, rig)
     async with app.run_test(size=(80, 24)) as pilot:
         rig.changed = True
-        while not app.page or app.follower.view is None:
+        while not app.model.page or app.model.view is None:
             await pilot.pause(0.01)
         yield app, pilot

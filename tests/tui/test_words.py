@@ -37,9 +37,9 @@ NASTY = ["[red]x[/", "[/]", "\x1b[2J\x07\x9b31m", "x" * 10_000, "[@click=app.exi
 
 def model(text):
     state = {"port": {"url": text, "simulated": True}, "session": {"title": text, "path": text},
-             "control": {"client": text}, "link": {"state": "up"}}  # fmt: skip
+             "control": {"client": text}, "link": {"state": "up"}, "runs": [RUN]}  # fmt: skip
     flow = Flow(Stage.RESULT, Job(1, 1), verdict="void", reasons=(plain_reason(text),))
-    return Model(read_state(state), flow, Indicators(), connected=True, port=text)
+    return Model(FakeClient(read_state(state)), flow, state=read_state(state))
 
 
 @pytest.mark.parametrize("text", NASTY, ids=range(len(NASTY)))
@@ -65,8 +65,9 @@ def test_a_void_drop_says_what_to_do():
 
 def test_enter_is_not_offered_before_the_verdict_is_kept():
     """It would do nothing: what comes next depends on the verdict."""
-    shown = replace(model("x"), driving=True)
-    waits, kept = (shown.flow._replace(logged=logged) for logged in (False, True))
+    shown = model("x")
+    kept = shown.flow._replace(verdict="accepted")
+    waits = kept._replace(logged=False)
     job = Job(2, 1)
     assert step(waits, GoOn(job, 0.0)) == (waits, ())
     assert "Enter after the verdict is saved" in keys_of(replace(shown, flow=waits))
@@ -75,7 +76,7 @@ def test_enter_is_not_offered_before_the_verdict_is_kept():
 
 
 def keys_of(shown, width=80):
-    return hints(replace(shown, page="result"), KEYS, width, lambda _: True).plain
+    return hints(replace(shown, page="result"), KEYS, width).plain
 
 
 @pytest.mark.parametrize("width", [20, 40, 78, 198])
@@ -123,23 +124,21 @@ def test_a_gate_that_is_blocked_from_the_beginning_has_not_changed():
     assert (indicators.gates[0].edges, indicators.blocked_channels) == (0, (2,))
 
 
-def _model(state=None, **more):
-    return Model(read_state(STATE | (state or {})), Flow(), Indicators(), connected=True, **more)
+def _model(**state):
+    return Model(FakeClient(DaemonState()), Flow(), state=read_state(STATE | state))
 
 
 def test_what_is_wrong_is_said_with_what_to_do():
-    assert alarm(_model()) is None
+    assert not alarm(_model())
     for stage, begun in ((Stage.PROTOCOL, False), (Stage.PREPARE, True)):
-        gone = alarm(Model(DaemonState(), Flow(stage), Indicators(), silence="it is gone"))
-        assert "it is gone" in gone.message
-        assert ("supply" in gone.hint) == begun, "nothing of ours can fall before that"
-    lost = alarm(
-        _model({"link": {"state": "down", "error": {"message": "[unplugged"}, "retry_s": 2}})
-    )
-    assert "[unplugged" in lost.message
-    assert "cable" in lost.hint
-    failed = alarm(_model({"error": {"message": "disk full", "hint": "make room"}}))
-    assert failed == ("disk full", "make room")
+        gone = alarm(Model(ReconnectingClient("sim://", None, None), Flow(stage)))
+        assert "no daemon: connecting" in gone
+        assert ("supply" in gone) == begun, "nothing of ours can fall before that"
+    lost = alarm(_model(link={"state": "down", "error": {"message": "[unplugged"}, "retry_s": 2}))
+    assert "[unplugged" in lost
+    assert "cable" in lost
+    failed = _model(error={"message": "disk full", "hint": "make room"})
+    assert alarm(failed) == "disk full\nmake room"
 
 
 def test_a_port_that_is_back_before_anybody_looked_was_lost_all_the_same():
@@ -236,7 +235,7 @@ def test_terminal_and_locale_say_when(environment, is_ascii):
 
 async def test_a_whole_screen_is_ascii():
     app = RigApp(Options(ascii=True), KEYS, FakeClient(DaemonState(QUIET)))
-    app.driver.flow = Flow(Stage.DEVICE)
+    app.model.flow = Flow(Stage.DEVICE)
     async with app.run_test(size=(80, 24)) as pilot:
         while "DEVICE" not in text_of(app):
             await pilot.pause()

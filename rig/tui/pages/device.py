@@ -14,10 +14,10 @@ from rig.tui.widgets.gates import board, label
 from rig.tui.widgets.text import check_line, plain
 
 
-def face(model: Model, desk: Desk, width: int) -> Face:
+def face(model: Model, desk: Desk) -> Face:
     """Return the device page: connection, and state of the gates."""
     rig = hanging(model, desk)[1]
-    gates = board(model.protocol, model.indicators, model.now_s, width)
+    gates = board(model.protocol, model.indicators, desk.width)
     words = [*gates, Content(""), _gate_check(model), _release(model)]
     return Face(_facts(model), rig, words=Content("\n").join(words), top=True)
 

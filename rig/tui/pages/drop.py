@@ -1,17 +1,15 @@
 """Page of a drop, from the check of its gates to its result and replay: steps, rig, plot."""
 
-from __future__ import annotations
-
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from time import monotonic
 
 from textual.content import Content
 
 from rig.analysis.result import GOOD
 from rig.campaign.machine import Stage
-from rig.protocol.protocol import Run
-from rig.reasons import Reason, notes_in, remedies
+from rig.reasons import notes_in, remedies
 from rig.records import Job
+from rig.results.live import SessionView
+from rig.results.whole import last_entries
 from rig.tui.desk import Desk, Face
 from rig.tui.drop_words import LOOKS, expected_words, headline, number_table, past_runs, sentence
 from rig.tui.model import Model
@@ -23,9 +21,6 @@ from rig.tui.scale import Drawing, drawing
 from rig.tui.widgets.gates import board
 from rig.tui.widgets.text import plain
 
-if TYPE_CHECKING:
-    from rig.results.live import SessionView
-
 _DONE = dict.fromkeys((Stage.ARMING, Stage.COUNTDOWN, Stage.FIRING, Stage.LIVE), 3)
 _DONE |= {Stage.SETTLING: 2, Stage.JUDGING: 4, Stage.RESULT: 5, Stage.HALTED: 5}
 """Number of completed steps, by stage."""
@@ -33,21 +28,21 @@ _REMEDIES = 2
 """Most instructions shown at once; others follow when these are done."""
 
 
-def face(model: Model, desk: Desk, width: int) -> Face:
+def face(model: Model, desk: Desk) -> Face:
     """Return the page of the present run: before, during or after the drop."""
     if model.page in {"result", "history"} or model.stage in {Stage.RESULT, Stage.HALTED}:
-        return _result(model, desk, width)
+        return _result(model, desk)
     protocol, run = model.protocol, model.run
     if model.loading or protocol is None or run is None:
         return Face(Content(model.loading or next_step(model).text))
     falls, rig = hanging(model, desk)
-    counting = model.stage is Stage.COUNTDOWN and model.driving
+    counting = model.stage is Stage.COUNTDOWN and model.client.driving
     expected = desk.latest("expected", (protocol, run), lambda: expected_words(protocol, run))
     height = f"{protocol.of(run).drop.value * 1e3:.0f} mm {protocol.drop_from}"
     facts = f"drop   {height}\nmodel  {expected}\n"
-    gates = board(protocol, model.indicators, model.now_s, width)
+    gates = board(protocol, model.indicators, desk.width)
     return Face(
-        Content("\n").join([steps(model), _headline(model, run), _action(model)]),
+        Content("\n").join([steps(model), *_headline(model), _action(model)]),
         rig,
         desk.latest("pictures", (protocol, run), lambda: fall_pictures(falls)),
         words=Content("\n").join([Content(facts), *gates]),
@@ -61,8 +56,9 @@ def hanging(model: Model, desk: Desk) -> tuple[tuple[ChainFall, ...], Drawing | 
     if protocol is None or run is None:
         return (), None
     falls = desk.latest("falls", (protocol, run), lambda: motions(protocol, run))
-    seen = protocol, run, model.indicators.blocked_channels
-    rig = desk.latest("rig", seen, lambda: drawing(protocol, run, falls, model.indicators, 0.0))
+    blocked = model.indicators.blocked_channels
+    key = protocol, run, blocked
+    rig = desk.latest("rig", key, lambda: drawing(protocol, run, falls, blocked, 0.0))
     return falls, rig
 
 
@@ -71,19 +67,21 @@ def steps(model: Model) -> Content:
     indicators = model.indicators
     behind = _DONE.get(model.stage, 0)
     clear = indicators.known and not indicators.blocked_channels
-    still = clear and not indicators.restless(model.now_s)
-    good = [behind > 0, behind > 1 or clear, behind > 2 or still, behind > 3, behind > 4]
-    names = hand(model), "Clear", "Still", "Drop", "Result"
+    still = clear and not indicators.restless(monotonic())
+    signs = {hand(model): False, "Clear": clear, "Still": still, "Drop": False, "Result": False}
     parts = []
-    for at, name in enumerate(names):
-        mark = ("✓", "bold $success") if good[at] else ("◌" * (at <= max(behind, 2)), "$warning")
+    for at, (name, seen) in enumerate(signs.items()):
+        coming = "◌" * (at <= max(behind, 2)), "$warning"
+        mark = ("✓", "bold $success") if seen or at < behind else coming
         parts.append(Content.assemble(f"{name} ", mark))
     return Content(" · ").join(parts)
 
 
-def _headline(model: Model, run: Run) -> Content:
-    attempt = model.job.attempt if model.job else 1
-    return Content.styled(headline(run, len(model.state.runs) or 1, attempt), "bold $primary")
+def _headline(model: Model) -> list[Content]:
+    """Return the headline of the present run, if there is any."""
+    run, job = model.run, model.job
+    text = headline(run, len(model.state.runs) or 1, job.attempt) if run and job else ""
+    return [Content.styled(text, "bold $primary")] * bool(text)
 
 
 def _action(model: Model) -> Content:
@@ -97,33 +95,27 @@ def verdict_words(model: Model) -> Content:
     if model.job is None or not verdict:
         return Content(model.loading or "No verdict yet.")
     symbol, colour = LOOKS.get(verdict, ("?", "$foreground"))
-    lines = [Content.styled(f" {symbol} {verdict.upper()} ", f"bold $background on {colour}")]
-    lines += [Content(f"  {plain(reason, 200)}") for reason in reasons[:4]]
-    if len(reasons) > 4:
-        lines.append(Content("  and more reasons, in the session file"))
+    lines = [plain(reason, 200) for reason in reasons[:4]]
+    lines += ["and more reasons, in the session file"] * (len(reasons) > 4)
     replaced = model.previous
     if verdict not in GOOD and replaced is not None:
         lines += [
-            Content(
-                f"  Only the latest attempt counts: attempt {replaced.attempt} was good, "
-                f"but run {model.job.run} has no result now."
-            ),
-            Content("  → press a to repeat it before you change anything at the rig"),
+            f"Only the latest attempt counts: attempt {replaced.attempt} was good, "
+            f"but run {model.job.run} has no result now.",
+            "→ press a to repeat it before you change anything at the rig",
         ]
-    if model.blind:
-        lines.append(Content("  BLIND: results are hidden until you unblind the session"))
+    lines += ["BLIND: results are hidden until you unblind the session"] * model.blind
     if verdict == "void":
-        lines += [Content(f"  → {remedy}") for remedy in remedies(reasons)[:_REMEDIES]]
-    return Content("\n").join(lines)
+        lines += [f"→ {remedy}" for remedy in remedies(reasons)[:_REMEDIES]]
+    badge = f" {symbol} {verdict.upper()} ", f"bold $background on {colour}"
+    return Content.assemble(badge, *(f"\n  {line}" for line in lines))
 
 
-def _result(model: Model, desk: Desk, width: int) -> Face:
+def _result(model: Model, desk: Desk) -> Face:
     """Return the result of the latest drop, first in slow motion, or of a drop of the history."""
     view, job = desk.drop(model)
     own = model.page != "history"
-    parts = [verdict_words(model)] if own else []
-    if own and model.run is not None:
-        parts.insert(0, _headline(model, model.run))
+    parts = [*_headline(model), verdict_words(model)] if own else []
     if own and model.stage in {Stage.RESULT, Stage.HALTED}:
         parts = [steps(model), *parts, _action(model)]
     if view is None or job is None:
@@ -138,31 +130,30 @@ def _result(model: Model, desk: Desk, width: int) -> Face:
     falls = desk.latest(
         "moment", (view.path, job, hz), lambda: motions(view.protocol, run, recorded)
     )
-    key = view.path, view.reading, job, width
-    pictures = desk.latest(
-        "figures", key[:3], lambda: drop_pictures(view, job) or fall_pictures(falls)
-    )
+    key = view.path, view.reading, job
+    pictures = desk.latest("figures", key, lambda: drop_pictures(view, job) or fall_pictures(falls))
     words = desk.latest("words", key, lambda: Content(number_table(view, job)))
-    logged = (line.reasons for line in reversed(view.states) if (line.run, line.attempt) == job)
-    reasons = next(logged, ())
     time_s = player.time_s if begun else seen[-1].tick / hz if seen else 0.0
+    gates = board(view.protocol, indicators, desk.width)
     said = "slow motion …" if own and player.playing else sentence(view, job)
     foot = Content.assemble((said, "bold $success"), "\n" * bool(said), past_runs(view, job))
     return Face(
-        Content("\n").join(parts or _which(view, job, player, reasons)),
-        drawing(view.protocol, run, falls, indicators, time_s),
+        Content("\n").join(parts or _which(view, job, player)),
+        drawing(view.protocol, run, falls, indicators.blocked_channels, time_s),
         pictures,
         player.time_s - (falls[0].delay_s if falls else 0.0) if begun else None,
-        Content("\n").join([words, Content(""), *board(view.protocol, indicators, 0.0, width)]),
+        Content("\n").join([words, Content(""), *gates]),
         foot,
     )
 
 
-def _which(view: SessionView, job: Job, player: Player, reasons: Sequence[Reason]) -> list[Content]:
+def _which(view: SessionView, job: Job, player: Player) -> list[Content]:
     """Return the name of the replayed drop, and the state of the replay."""
     verdict, run = view.results[job].verdict, view.plan[job.run]
     what = f"{run.set_up} {f'impact {run.impact}' if run.impact else run.free}".strip()
     state = "▶ playing" if player.playing else "‖ paused"
+    logged = last_entries(view.states).get(job)
+    said = notes_in(logged.reasons) if logged else []
     return [
         Content.assemble(
             (f"drop {view.jobs.index(job) + 1} of {len(view.jobs)}", "bold $primary"),
@@ -173,5 +164,5 @@ def _which(view: SessionView, job: Job, player: Player, reasons: Sequence[Reason
             f"{state} at {player.speed:.3g} × real speed, t = {player.time_s * 1e3:.0f} ms · "
             f"{plain(view.path.name, 60)}{'  ▲ SIMULATED' * view.simulated}"
         ),
-        *(Content(f"note: {plain(text, 160)}") for text in notes_in(reasons)),
+        *(Content(f"note: {plain(text, 160)}") for text in said),
     ]

@@ -1,5 +1,6 @@
 """Home: try it, connect a board, continue, begin something new, or look at results."""
 
+from functools import partial
 from itertools import groupby
 
 from textual.content import Content
@@ -12,7 +13,6 @@ from rig.protocol.protocol import Protocol
 from rig.text_rows import read_paragraphs
 from rig.tui.beginnings import Beginning
 from rig.tui.desk import Desk, Face
-from rig.tui.indicators import Indicators
 from rig.tui.model import Model
 from rig.tui.motion import motions
 from rig.tui.scale import Drawing, drawing
@@ -22,30 +22,29 @@ _FALLEN = 0.7  # share of the fall shown in small pictures
 _DOES = {kind: "\n".join(lines) for kind, *lines in read_paragraphs(__file__)}
 
 
-def face(model: Model, desk: Desk, width: int) -> Face:
+def face(model: Model, desk: Desk) -> Face:
     """Return the home page: possible beginnings, or the protocol of the open session."""
-    del width
-    if model.flow.stage is not Stage.PROTOCOL and model.protocol is not None:
-        words = _description(desk, model.protocol)
-        return Face(Content(""), _picture(desk, model.protocol), words=words, top=True)
-    row = desk.chosen
-    if row is None:
-        return Face(Content("looking around …"))
-    does, picture = _DOES.get(row.kind) or _into(model, desk, row), None
-    parts = [Content(does)]
-    protocol, problem = desk.reading(row.file) if row.file else (None, "")
-    if problem:
-        parts = [Content.assemble((f"✗ {plain(row.file)}\n\n", "bold $error"), problem)]
-    elif protocol is not None:
-        parts.append(_description(desk, protocol))
-        picture = _picture(desk, protocol)
-    return Face(Content(""), picture, words=Content("\n\n").join(parts), menu=_menu(desk), top=True)
+    protocol, menu, picture = model.protocol, Content(""), None
+    parts: list[Content] = []
+    if model.flow.stage is Stage.PROTOCOL or protocol is None:
+        row = desk.chosen
+        if row is None:
+            return Face(Content("looking around …"))
+        protocol, problem = desk.reading(row.file) if row.file else (None, "")
+        parts, menu = [Content(_DOES.get(row.kind) or _into(model, desk, row))], _menu(desk)
+        if problem:
+            protocol = None
+            parts = [Content.assemble((f"✗ {plain(row.file)}\n\n", "bold $error"), problem)]
+    if protocol is not None:
+        parts.append(desk.latest("description", protocol, partial(_describe_protocol, protocol)))
+        picture = desk.latest("picture", protocol, partial(_picture, protocol))
+    return Face(drawing=picture, words=Content("\n\n").join(parts), menu=menu, top=True)
 
 
 def _into(model: Model, desk: Desk, row: Beginning) -> str:
     """Return the rig and session file of an experiment in words."""
     session = plain(row.session or desk.options.session or "")
-    rig = model.port or "a simulation: no board is connected"
+    rig = model.client.port or "a simulation: no board is connected"
     return f"→ Enter opens it with {rig}\n→ session file: {session or 'a new one'}"
 
 
@@ -60,20 +59,12 @@ def _menu(desk: Desk) -> Content:
     return Content("\n").join(lines)
 
 
-def _picture(desk: Desk, protocol: Protocol) -> Drawing | None:
+def _picture(protocol: Protocol) -> Drawing | None:
     """Return a drawing of the predicted fall, part of the way down."""
-
-    def draw() -> Drawing | None:
-        run = runs(protocol)[0]
-        falls = motions(protocol, run)
-        end = max((fall.end_s for fall in falls), default=0.0)
-        return drawing(protocol, run, falls, Indicators(), _FALLEN * end) if falls else None
-
-    return desk.latest("picture", protocol, draw)
-
-
-def _description(desk: Desk, protocol: Protocol) -> Content:
-    return desk.latest("description", protocol, lambda: _describe_protocol(protocol))
+    run = runs(protocol)[0]
+    falls = motions(protocol, run)
+    end = max((fall.end_s for fall in falls), default=0.0)
+    return drawing(protocol, run, falls, (), _FALLEN * end) if falls else None
 
 
 def _describe_protocol(protocol: Protocol) -> Content:

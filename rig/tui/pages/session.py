@@ -6,6 +6,7 @@ from pathlib import Path
 from textual.content import Content
 
 from rig.analysis.joint_fit import FEWEST
+from rig.analysis.session import Analysis
 from rig.campaign.plan import done
 from rig.report.columns import Part
 from rig.report.parts import means_parts, scatter_parts, tables
@@ -16,21 +17,14 @@ from rig.tui.plots import session_pictures
 from rig.tui.widgets.text import duration, plain
 
 
-def face(model: Model, desk: Desk, width: int) -> Face:
+def face(model: Model, desk: Desk) -> Face:
     """Return the session page: plan, results against incline, and control charts."""
-    del width
     view = model.view
     if view is None:
         return Face(_progress(model))
-    key, summary = (view.path, view.reading), view.analysis.summary
-    means = desk.latest("means", key, lambda: _table(tables("means", summary)))
-    drops = desk.latest(
-        "drops",
-        key,
-        lambda: _table(
-            [*means_parts(summary), *scatter_parts(summary), *tables("runs", view.analysis.runs)]
-        ),
-    )
+    key = view.path, view.reading
+    means = desk.latest("means", key, lambda: _table(tables("means", view.analysis.summary)))
+    drops = desk.latest("drops", key, lambda: _drop_tables(view.analysis))
     head = Content("\n").join([_progress(model), means])
     shown = desk.latest("charts", key, lambda: [*session_pictures(view)])
     turned = desk.chart % max(1, len(shown))
@@ -40,14 +34,17 @@ def face(model: Model, desk: Desk, width: int) -> Face:
     return Face(head, pictures=drawn, foot=Content(foot), beside=2, words=drops)
 
 
+def _drop_tables(analysis: Analysis) -> Content:
+    means, runs = analysis.summary, analysis.runs
+    return _table([*means_parts(means), *scatter_parts(means), *tables("runs", runs)])
+
+
 def _progress(model: Model) -> Content:
-    if model.loading:
-        return Content(model.loading)
     runs = model.state.runs
+    if model.loading or not runs:
+        return Content(model.loading or "No session is open.")
     voids = model.voids.counts(runs)
     over = sum(done(line, voids.get(line.run, 0)) for line in runs)
-    if not runs:
-        return Content("No session is open.")
     pace = model.view.pace_s if model.view else None
     left_s = (pace or 0.0) * (len(runs) - over)
     remaining = f" · about {duration(left_s)} left" * bool(left_s)
@@ -78,7 +75,7 @@ def _fit_words(model: Model) -> tuple[str, str]:
 
 def _marks(model: Model) -> Iterator[tuple[str, str]]:
     """Yield a symbol for each run in order; the present run in reverse colours."""
+    present = model.job.run if model.job else None
     for line in model.state.runs:
-        is_now = model.job is not None and line.run == model.job.run
         symbol, colour = LOOKS.get(line.state, ("?", "$foreground"))
-        yield symbol, f"{colour} reverse" if is_now else colour
+        yield symbol, f"{colour} reverse" if line.run == present else colour

@@ -1,15 +1,14 @@
-"""Top and bottom bars of every screen: title, problems, possible keys, and STOP."""
+"""Lines above and below every page: title, tabs, problems, possible keys, and STOP."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from time import monotonic
 
-from textual.app import ComposeResult
-from textual.containers import Vertical
 from textual.content import Content
 
-from rig.tui.actions import BY_NAME, PAGES, Action, shown_key
+from rig.tui.actions import BY_NAME, PAGES, shown_key
 from rig.tui.model import UNDER_WAY, Model, alarm
 from rig.tui.next_step import next_step
-from rig.tui.widgets.text import Words, link_action, plain
+from rig.tui.widgets.text import link_action, plain
 
 LINKS = {"up": "● link up", "opening": "◌ opening", "down": "✗ link down", "closed": "○ no link"}
 TABS = {page: BY_NAME[f"page_{page}"].label for page, *_ in PAGES}
@@ -21,30 +20,15 @@ _TOLD_S = 4.0
 _UNANSWERED_S = 0.5
 
 
-class StatusBar(Vertical):
-    """Headline and tabs of pages, with problems and remedies below."""
-
-    def compose(self) -> ComposeResult:
-        yield Words(id="headline")
-        yield Words(id="tabs")
-        yield Words(id="alarm")
-
-    def show(self, model: Model, keys: Mapping[str, str], width: int, message: str) -> None:
-        """Draw the present state; `message` only without problems."""
-        self.query_one("#headline", Words).say(headline(model, width - 2))
-        self.query_one("#tabs", Words).say(_tabs(model.page, keys))
-        wrong = alarm(model)
-        box = self.query_one("#alarm", Words)
-        box.display = wrong is not None or bool(message)
-        box.set_class(wrong is None, "-told")
-        if wrong is None:
-            box.say(plain(message, 240))
-        else:
-            hint = f"\n  → {plain(wrong.hint, 240)}" if wrong.hint else ""
-            box.say(("✗ ", "bold $error"), (plain(wrong.message, 160), "bold"), hint)
+def problem(model: Model) -> Content:
+    """Return the most serious present problem with its remedy; empty without problems."""
+    message, _, hint = alarm(model).partition("\n")
+    remedy = f"\n  → {plain(hint, 240)}" if hint else ""
+    parts = ("✗ ", "bold $error"), (plain(message, 160), "bold"), remedy
+    return Content.assemble(*parts) if message else Content("")
 
 
-def _tabs(page: str, keys: Mapping[str, str]) -> Content:
+def tabs(page: str, keys: Mapping[str, str]) -> Content:
     """Return all pages with their keys; each can be clicked."""
     parts: list[Content] = []
     for name, title in TABS.items():
@@ -56,16 +40,14 @@ def _tabs(page: str, keys: Mapping[str, str]) -> Content:
 
 def headline(model: Model, width: int) -> Content:
     """Return a line of exactly `width`: page and title left, SIMULATED mark and link right."""
-    link = LINKS.get(model.state.link, "○ no link") if model.connected else "✗ no daemon"
-    if model.offline or model.idle:
+    link = LINKS.get(model.state.link, "○ no link") if model.client.up else "✗ no daemon"
+    if model.client.idle:
         link = "file only" if model.offline else "no rig yet"
-    right_side = f"{plain(model.port, 24)}  {link}" if model.port else link
+    right_side = f"{plain(model.client.port, 24)}  {link}" if model.client.port else link
     stamp = " ▲ SIMULATED " * model.simulated
     blind = " BLIND " * model.blind
     name = TABS.get(model.page, model.page).upper()
-    title = model.state.section("session").get("title") or (
-        model.protocol.title if model.protocol else "chainrig"
-    )
+    title = model.state.section("session").get("title") or "chainrig"
     room = width - len(name) - len(stamp) - len(blind) - len(right_side) - 3
     return Content.assemble(
         (f"{name}  ", "bold $primary"),
@@ -76,69 +58,38 @@ def headline(model: Model, width: int) -> Content:
     )
 
 
-class StopLine(Words):
-    """The STOP bar, also for the mouse, with the present activity."""
-
-    def show(self, model: Model, keys: Mapping[str, str]) -> None:
-        """Draw the present state."""
-        self.set_class(model.hot, "-hot")
-        stop = Content(f" ■ STOP  {shown_key(keys['stop'])} or Esc ")
-        self.say(link_action(stop, "app.do('stop')"), f"  {_doing(model)}")
+def stop_line(model: Model, keys: Mapping[str, str]) -> Content:
+    """Return the STOP bar, also for the mouse, with the present activity."""
+    stop = Content(f" ■ STOP  {shown_key(keys['stop'])} or Esc ")
+    return Content.assemble(link_action(stop, "app.do('stop')"), f"  {_doing(model)}")
 
 
-class StopBar(Vertical):
-    """Keys of the page, and the STOP bar."""
-
-    def compose(self) -> ComposeResult:
-        yield Words(id="hints")
-        yield StopLine()
-
-    def show(
-        self, model: Model, keys: Mapping[str, str], width: int, possible: Callable[[Action], bool]
-    ) -> None:
-        """Draw the present state."""
-        self.query_one("#hints", Words).say(hints(model, keys, width - 2, possible))
-
-
-def hints(
-    model: Model, keys: Mapping[str, str], width: int, possible: Callable[[Action], bool]
-) -> Content:
+def hints(model: Model, keys: Mapping[str, str], width: int) -> Content:
     """Return the most important keys now; all others are in the palette."""
-    page = _OF_PAGE.get(model.page, ())
-    parts: list[Content] = []
-    used = 0
-    for name in (*dict.fromkeys((*page, *_ANYWHERE)), "palette"):
-        label = _label(name, model)
-        full = len(parts) == 2 * (KEYS_SHOWN - 1) and name != "palette"
-        if full or not label or not possible(BY_NAME[name]):
-            continue
-        hint = Content.assemble((shown_key(keys[name]), "bold $primary"), f" {label}")
-        used += len(hint) + 2
-        if used > width:
+    labels = {name: action.label for name, action in BY_NAME.items()}
+    labels["go_on"] = next_step(model).enter
+    labels["control"] = "" if model.client.driving else "take control"
+    labels["unblind"] *= model.blind
+    if model.flow.verdict == "rejected":
+        labels["reject"] = "undo rejection"
+    names = dict.fromkeys((*_OF_PAGE.get(model.page, ()), *_ANYWHERE))
+    useful = [name for name in names if labels[name] and model.allows(BY_NAME[name])]
+    line = Content("")
+    for name in (*useful[: KEYS_SHOWN - 1], "palette"):
+        hint = Content.assemble((shown_key(keys[name]), "bold $primary"), f" {labels[name]}")
+        if len(line) + len(hint) + 2 > width:
             break
-        parts += [link_action(hint, f"app.do('{name}')"), Content("  ")]
-    return Content.assemble(*parts)
-
-
-def _label(name: str, model: Model) -> str:
-    if name == "go_on":
-        return next_step(model).enter
-    if name == "reject" and model.flow.verdict == "rejected":
-        return "undo rejection"
-    if name == "unblind" and not model.blind:
-        return ""
-    if name == "control":
-        return "" if model.driving else "take control"
-    return BY_NAME[name].label
+        line = Content.assemble(line, link_action(hint, f"app.do('{name}')"), "  ")
+    return line
 
 
 def _answer(model: Model) -> str:
     """Return the result of a recent STOP in words."""
     if model.stop is None:
         return ""
-    waited = model.now_s - model.stop.at_s
+    waited = monotonic() - model.stop.at_s
     unheard = model.stop.heard is False or (model.stop.heard is None and waited > _UNANSWERED_S)
-    if waited > _TOLD_S and (model.connected or not unheard):
+    if waited > _TOLD_S and (model.client.up or not unheard):
         return ""
     if unheard:
         return "STOP NOT CONFIRMED: switch the release's supply off"
@@ -146,14 +97,14 @@ def _answer(model: Model) -> str:
 
 
 def _doing(model: Model) -> str:
-    if model.offline or model.idle:
+    if model.client.idle:
         return "no rig is connected: nothing can fall"
-    if not model.connected:
+    if not model.client.up:
         return _answer(model) or "no daemon: nothing can be stopped from here"
     answer = _answer(model)
     if answer and not model.hot:
         return answer
     holder = model.state.holder
-    watching = "" if model.driving or holder is None else f" · watching {holder[:24]}"
+    watching = "" if model.client.driving or holder is None else f" · watching {holder[:24]}"
     doing = next_step(model).text if model.stage in UNDER_WAY else model.state.phase
     return doing + watching + " · " * bool(answer) + answer

@@ -1,9 +1,9 @@
 """Dialogs over a page. STOP remains visible below every dialog, and works."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
-from textual import events, on
+from textual import events
 from textual.app import ComposeResult
 from textual.await_complete import AwaitComplete
 from textual.containers import Vertical, VerticalScroll
@@ -14,7 +14,6 @@ from textual.widget import Widget
 from textual.widgets import Input, OptionList
 from textual.widgets.option_list import Option
 
-from rig.tui.widgets.bars import StopLine
 from rig.tui.widgets.text import Words
 
 
@@ -29,28 +28,16 @@ class Dialog(ModalScreen[Any]):
         Description of its keys.
     """
 
-    LEAVE = ""
-    """Key that cancels; if empty, any key without another meaning."""
+    BINDINGS: ClassVar = [("up", "move(-1)"), ("down", "move(1)")]
 
-    def __init__(self, *parts: Widget, keys: str = "", large: bool = False) -> None:
-        super().__init__()
+    def __init__(self, *parts: Widget, keys: str = " ", large: bool = False) -> None:
+        super().__init__(classes="-large" * large)
         self._parts = [*parts, Words((keys, "bold $primary"), id="how")]
-        self._large = large
 
     def compose(self) -> ComposeResult:
-        with Vertical(classes="-large" * self._large):
+        with Vertical():
             yield from self._parts
-        yield StopLine()
-
-    def on_mount(self) -> None:
-        self.query("Input").focus()
-
-    def move(self, by: int) -> None:
-        """Move in the list, or scroll."""
-        for options in self.query(OptionList):
-            (options.action_cursor_down if by > 0 else options.action_cursor_up)()
-        for text in self.query(VerticalScroll):
-            text.scroll_relative(y=3 * by, animate=False)
+        yield Words(id="stop")
 
     def dismiss(self, result: Any = None) -> AwaitComplete:
         """Close with an answer, once: keys in quick succession may repeat it."""
@@ -74,6 +61,10 @@ class TextDialog(Dialog):
     def __init__(self, text: Content) -> None:
         super().__init__(VerticalScroll(Words(text, id="table"), can_focus=False), large=True)
 
+    def action_move(self, by: int) -> None:
+        """Scroll."""
+        self.query_one(VerticalScroll).scroll_relative(y=3 * by, animate=False)
+
 
 class _Choices(OptionList):
     """A list that changes while typing: a clicked item may be gone when the click is handled."""
@@ -95,14 +86,12 @@ class Ask(Dialog):
         Initial text.
     choices
         Choices instead of typing.
-    free
-        Whether other (not empty) text may be typed. Otherwise the text searches the choices, and
-        the answer is the number of a choice.
     chosen
-        The choice that is highlighted first; `None` for none.
+        The choice that is highlighted first: the text then searches the choices, and the answer is
+        the number of a choice. If `None`, other (not empty) text may be typed.
     """
 
-    LEAVE = "escape"
+    BINDINGS: ClassVar = [("escape", "dismiss")]
 
     def __init__(
         self,
@@ -110,57 +99,46 @@ class Ask(Dialog):
         text: str = "",
         choices: Sequence[str] = (),
         *,
-        free: bool = True,
         yes: str = "save",
         chosen: int | None = None,
     ) -> None:
+        free = chosen is None
         hint = "type to search" if not free else "type, or choose below with ↑ ↓" if choices else ""
         line = Input(text, max_length=200, select_on_focus=False, placeholder=hint)
         self._choices, self._free, self._first = choices, free, chosen
-        self._list = _Choices(markup=False)
-        parts = [Words((question, "bold"), id="question"), line, *([self._list] * bool(choices))]
+        self._list = _Choices(*self._matching(""), markup=False)
         keys = f"{'↑ ↓ ' * bool(choices)}Enter: {yes}   Esc: cancel"
-        super().__init__(*parts, keys=keys, large=bool(choices))
+        words = Words((question, "bold"), id="question")
+        super().__init__(words, line, self._list, keys=keys, large=bool(choices))
 
     def on_mount(self) -> None:
-        super().on_mount()
-        self._fill("")
-        if self._choices:
-            self._list.highlighted = self._first
+        self._list.highlighted = self._first
 
-    def _fill(self, query: str) -> None:
-        """List the matching choices."""
-        matcher = Matcher(query)
-        self._list.clear_options()
-        self._list.add_options(
-            Option(choice, str(at))
-            for at, choice in enumerate(self._choices)
-            if not query or matcher.match(choice)
-        )
+    def _matching(self, query: str) -> list[Option]:
+        """Return the choices that match, each with its number."""
+        matcher, choices = Matcher(query), enumerate(self._choices)
+        return [Option(text, str(at)) for at, text in choices if not query or matcher.match(text)]
 
-    @on(Input.Changed)
-    def _filter_choices(self, event: Input.Changed) -> None:
-        if not self._free and self._list.is_mounted:
-            self._fill(event.value)
+    def on_input_changed(self, event: Input.Changed) -> None:
+        """Show the choices that match."""
+        if not self._free:
+            self._list.set_options(self._matching(event.value))
             self._list.action_first()
 
-    def move(self, by: int) -> None:
+    def action_move(self, by: int) -> None:
         """Select the previous or next choice."""
-        if self._choices:
-            super().move(by)
-            option = self._list.highlighted_option
-            if self._free and option is not None and option.id is not None:
-                self.query_one(Input).value = self._choices[int(option.id)]
+        (self._list.action_cursor_down if by > 0 else self._list.action_cursor_up)()
+        if self._free and self._list.highlighted is not None:
+            self.query_one(Input).value = self._choices[self._list.highlighted]
 
-    @on(OptionList.OptionSelected)
-    def _take_choice(self, event: OptionList.OptionSelected) -> None:
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """Take a choice that was clicked."""
         if self._free:
             self.query_one(Input).value = self._choices[event.option_index]
         else:
-            self.action_say()
+            self.on_input_submitted()
 
-    @on(Input.Submitted)
-    def action_say(self) -> None:
+    def on_input_submitted(self) -> None:
         """Answer with the text, or the number of the choice."""
         typed, option = self.query_one(Input).value, self._list.highlighted_option
         if not self._free:

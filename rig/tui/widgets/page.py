@@ -1,14 +1,14 @@
 """The page widget: shows as many parts of a page's content as fit the screen."""
 
-from itertools import zip_longest
+from itertools import chain, repeat
 
 from textual.app import ComposeResult
 from textual.containers import Grid, Horizontal, Vertical, VerticalScroll
 from textual.widgets import Digits
 
 from rig.tui.desk import Desk, Face
+from rig.tui.plotting import draw_picture
 from rig.tui.scale import paint
-from rig.tui.widgets.figure import Figure
 from rig.tui.widgets.spans import SpanView
 from rig.tui.widgets.text import Words
 
@@ -26,9 +26,9 @@ class Page(Vertical):
         with Horizontal(id="parts"):
             with VerticalScroll(id="menu", can_focus=False):
                 yield Words(id="list")
-            yield SpanView(id="drawing")
+            yield SpanView(paint, slow=False, id="drawing")
             with Grid(id="plots"):
-                yield from (Figure() for _ in range(_FIGURES))
+                yield from (SpanView(draw_picture, slow=True) for _ in range(_FIGURES))
             with VerticalScroll(id="tables", can_focus=False):
                 yield Words(id="words")
         yield Words(id="foot")
@@ -38,21 +38,16 @@ class Page(Vertical):
         """Columns of the tables in the latest layout."""
         return max(20, (self.query_one("#tables").size.width or self.app.size.width) - 3)
 
-    def show(self, face: Face, desk: Desk, *, fresh: bool) -> None:
-        """Draw a page's content; `fresh` if another page was shown before."""
+    def show(self, face: Face, desk: Desk) -> None:
+        """Draw a page's content."""
         contents = {"head": face.head, "list": face.menu, "words": face.words, "foot": face.foot}
         for name, content in contents.items():
-            words = self.query_one(f"#{name}", Words)
-            words.say(content)
-            words.display = bool(content.plain)
+            self.query_one(f"#{name}", Words).say(content)
         self.query_one("#menu").display = bool(face.menu.plain)
         self._parts(face, desk)
         count = self.query_one(Digits)
         count.display = bool(face.digits)
         count.update(face.digits)
-        if fresh:
-            for name in ("top", "tables"):
-                self.query_one(f"#{name}", VerticalScroll).scroll_home(animate=False)
 
     def _parts(self, face: Face, desk: Desk) -> None:
         """Show as many parts as fit, beginning with the selected part."""
@@ -67,24 +62,29 @@ class Page(Vertical):
         for part in there:
             self.query_one(f"#{part}").display = part in shown
         if face.drawing is not None and "drawing" in shown:
-            view = self.query_one("#drawing", SpanView)
-            seen = face.drawing, view.size.width or 38, view.size.height or 16
-            view.take(desk.latest("painted", seen, lambda: paint(*seen)))
+            self.query_one("#drawing", SpanView).show(face.drawing)
         pairs = 2 if columns >= _WIDE and lines >= 40 else 1
         most = face.beside * pairs if columns >= _NORMAL else 1
         turn = desk.chart % max(1, len(face.pictures)) if face.beside == 1 else 0
         pictures = [*face.pictures[turn:], *face.pictures[:turn]][: most * ("plots" in shown)]
         self.query_one("#plots").set_class(most > 1 and face.beside > 1, "-pairs")
-        for figure, picture in zip_longest(self.query(Figure), pictures):
-            figure.show(picture, face.moment)
+        figures = self.query("#plots SpanView").results(SpanView)
+        for figure, picture in zip(figures, chain(pictures, repeat(())), strict=False):
+            figure.display = bool(picture)
+            if picture:
+                figure.show(picture, face.moment)
+
+    def rewind(self) -> None:
+        """Scroll to the beginning."""
+        for part in self.query("#top, #tables"):
+            part.scroll_home(animate=False)
 
     def scroll_tables(self, by: int) -> None:
         """Scroll the parts that do not fit, except the menu."""
-        for part in self.query(VerticalScroll):
-            if part.id != "menu":
-                part.scroll_relative(y=by, animate=False)
+        for part in self.query("#top, #tables"):
+            part.scroll_relative(y=by, animate=False)
 
     def show_row(self, line: int) -> None:
         """Scroll the list so that a line is visible."""
-        menu = self.query_one("#menu", VerticalScroll)
+        menu = self.query_one("#menu")
         menu.scroll_to(y=line - menu.size.height // 2, animate=False)

@@ -1,7 +1,9 @@
 """Widget for lines of coloured spans, without the wrapping and styling of other text."""
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from functools import lru_cache
+from time import monotonic
+from typing import Any
 
 from rich.segment import Segment
 from rich.style import Style
@@ -9,19 +11,43 @@ from textual.geometry import Region
 from textual.strip import Strip
 from textual.widget import Widget
 
-from rig.tui.braille import Span
+from rig.tui.braille import Rows
+
+PAUSE_S = 0.2
+"""Least time between new pictures, s."""
 
 
 class SpanView(Widget):
-    """Widget that shows lines of spans, for content that changes many times a second."""
+    """Lines of spans that fill the widget, for content that changes many times a second.
 
-    _rows: Sequence[Sequence[Span]] = ()
-    _plain = Style()
+    Parameters
+    ----------
+    draw
+        Returns the lines of some content, given also the width and height in characters.
+    slow
+        Whether other content is drawn at most once in `PAUSE_S`.
+    more
+        Attributes of any widget.
+    """
 
-    def take(self, rows: Sequence[Sequence[Span]]) -> None:
-        """Show other lines."""
-        if rows != self._rows:
-            self._rows = rows
+    def __init__(self, draw: Callable[..., Rows], *, slow: bool, **more: Any) -> None:
+        super().__init__(**more)
+        self._draw, self._slow = draw, slow
+        self._rows: Rows = []
+        self._content: tuple[Any, ...] = ()
+        self._at_s = -PAUSE_S
+        self._plain = Style()
+
+    def show(self, *content: Any) -> None:
+        """Show other content."""
+        if content != self._content and monotonic() - self._at_s >= PAUSE_S * self._slow:
+            self._content, self._at_s = content, monotonic()
+            self.on_resize()
+
+    def on_resize(self) -> None:
+        """Draw the content in the new size."""
+        if self._content and self.size:
+            self._rows = self._draw(*self._content, *self.size)
             self.refresh()
 
     def render_lines(self, crop: Region) -> list[Strip]:

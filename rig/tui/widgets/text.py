@@ -1,7 +1,5 @@
 """Sanitizing of foreign text for a terminal, and static text that is never parsed as markup."""
 
-from __future__ import annotations
-
 import re
 from typing import TypeAlias
 
@@ -48,39 +46,34 @@ def link_action(content: Content, action: str) -> Content:
 
 def check_line(good: bool, text: str) -> Content:
     """Return text after a sign for good or bad."""
-    sign = ("✓ ", "bold $success") if good else ("✗ ", "bold $error")
-    return Content.assemble(sign, text)
+    return Content.assemble(("✓ ", "bold $success") if good else ("✗ ", "bold $error"), text)
 
 
-Styled: TypeAlias = "str | tuple[str, str]"
+Styled: TypeAlias = str | tuple[str, str]
 """Text, or text with its style."""
 
 
 class Words(Static):
-    """Text on a page."""
+    """Text on a page, which takes no room while it is empty."""
 
     def __init__(self, *parts: Styled | Content, id: str | None = None) -> None:  # noqa: A002
         super().__init__(markup=False, id=id)
         self.auto_links = False  # clickable text keeps its colours
-        self._said: Content | None = None
-        if parts:
-            self.say(*parts)
+        self._said = Content("")
+        self.display = False
+        self.say(*parts)
 
     def say(self, *parts: Styled | Content) -> None:
         """Show these parts if they have changed, with a new layout only if necessary."""
         content = Content.assemble(*parts)
-        if self._said is None or not self._said.is_same(content):
-            same = self._said is not None and self._fits(self._said) and self._fits(content)
-            same = same and _lines(self._said) == _lines(content)
-            self._said = content
-            if not same:
+        if not self._said.is_same(content):
+            is_same_height = self._height(content) == self._height(self._said) is not None
+            self._said, self.display = content, bool(content.plain)
+            if not is_same_height:
                 self._layout_updates += 1  # otherwise an outdated height is kept
-            self.update(content, layout=not same)
+            self.update(content, layout=not is_same_height)
 
-    def _fits(self, content: Content) -> bool:
-        """Whether all lines fit the width."""
-        return max(map(len, content.plain.split("\n"))) < self.size.width
-
-
-def _lines(content: Content | None) -> int:
-    return 0 if content is None else content.plain.count("\n")
+    def _height(self, content: Content) -> int | None:
+        """Return the number of lines; `None` unless all fit the width."""
+        lines = content.plain.split("\n")
+        return len(lines) if max(map(len, lines)) < self.size.width else None
