@@ -13,8 +13,9 @@ from rig.link import messages as wire
 from rig.link.frames import DELIMITER, Frame, encode
 from rig.link.port import Port
 from rig.link.refusals import DeviceRefusedError
-from rig.link.transcript import Direction, Incoming, Record, Restart, Transcript
+from rig.link.transcript import Incoming, Record, Restart, Transcript
 from rig.reasons import rig_error
+from rig.records import Direction
 
 Answer = TypeVar("Answer", bound=wire.DeviceMessage)
 Halted: TypeAlias = Callable[[], bool]

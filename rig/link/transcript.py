@@ -5,15 +5,13 @@ get the same drops by construction. How the bytes were cut into chunks matters o
 times of clock samples and for the lone delimiter with which a client begins a connection.
 """
 
-from typing import Literal, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 from rig.link import messages as wire
 from rig.link.assembly import Assembly
 from rig.link.frames import DELIMITER, Decoder, Frame
-from rig.records import ClockSample, Drop, Pulse
+from rig.records import ClockSample, Direction, Drop, Pulse
 
-Direction: TypeAlias = Literal["tx", "rx"]
-"""``tx``: host to device."""
 _CAUSES = {1: "power", 2: "reset pin", 4: "brown-out", 8: "watchdog"}
 
 

@@ -12,14 +12,14 @@ from rig.link.client import BOOT_WAIT_S, Device
 from rig.link.messages import Arm, Identity, pack_label
 from rig.link.port import Port, open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
-from rig.link.transcript import Direction, Record
+from rig.link.transcript import Record
 from rig.ports import told
 from rig.protocol.measurable import record_ms
 from rig.protocol.protocol import Protocol
 from rig.reasons import rig_error, sentences
 from rig.recorder.feed import StateFeed
 from rig.recorder.published import PublishedState
-from rig.records import ClockSample, Drop, Job, Pulse
+from rig.records import ClockSample, Direction, Drop, Job, Pulse
 from rig.session.schema import Reasons, RunState
 from rig.session.store import Session
 

@@ -11,8 +11,8 @@ from itertools import groupby
 from typing import Any
 
 from rig.link.messages import TEST_RUN, pack_events
-from rig.link.transcript import Direction, Incoming, Restart, Transcript
-from rig.records import Certificate, ClockSample, Drop, Job, Pulse
+from rig.link.transcript import Incoming, Restart, Transcript
+from rig.records import Certificate, ClockSample, Direction, Drop, Job, Pulse
 
 _LATER = [field.name for field in fields(Certificate) if field.default is None]
 """Fields that certificates of older formats do not have."""

@@ -13,9 +13,8 @@ from typing import Any, NamedTuple, TypeVar
 
 from rig.boards import GATES
 from rig.errors import RigError
-from rig.link.transcript import Direction
 from rig.reasons import errors_become, rig_error
-from rig.records import ClockSample, Drop, HostBreak, Job, Pulse
+from rig.records import ClockSample, Direction, Drop, HostBreak, Job, Pulse
 from rig.session.drop_check import WHOLE, ByteReplay, check_drop
 from rig.session.faults import translate_errors
 from rig.session.foreign import limit_steps

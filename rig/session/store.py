@@ -18,10 +18,9 @@ from typing import Self
 from rig import __version__
 from rig.errors import InputError, RigError, SessionError
 from rig.files import make_folder, state_folder
-from rig.link.transcript import Direction
 from rig.printable import encodable
 from rig.reasons import Reason, rig_error
-from rig.records import ClockSample, Drop, HostBreak, Pulse
+from rig.records import ClockSample, Direction, Drop, HostBreak, Pulse
 from rig.session.database import build, check_place, connect
 from rig.session.faults import translate_errors
 from rig.session.journal import Journal
