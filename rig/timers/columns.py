@@ -12,30 +12,19 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
-from typing import NamedTuple
 
 from rig.text_rows import read_rows
 from rig.timers import vocabulary
 from rig.timers.table import Row, RowBlock
 from rig.timers.timer_file import TimerFile
-from rig.timers.vocabulary import (
-    POWERS,
-    facts_held,
-    find_label,
-    form,
-    holds,
-    is_measured,
-    is_number,
-    kinds_of,
-    unit_of,
-)
+from rig.timers.vocabulary import POWERS, facts_held, find_label, form, kinds_of, unit_of
 
 SAMPLED = ("level", "volts")
 """Roles of samples: what an input was at a time, whether it changed then or not."""
 VALUES = (SAMPLED, ("state", "cleared"), ("edge",))
 """Roles that say what happened; of a table that has several, the first are read."""
 _WIDEST = 200
-_NO_ROLES = {"high", "low", "one", "zero", "unknown", "missing", "gate letter"}
+_NO_ROLES = {"high", "low", "one", "zero", "unknown", "undefined", "missing", "gate letter"}
 """Of words that say nothing of a column: those of cells, and letters without a number."""
 _MOST_OPEN = 3
 """Columns of which several roles are tried."""
@@ -94,7 +83,8 @@ ROW_COUNT = TimerColumn(-1, "", "index")
 """Where rows have neither times nor numbers, they are counted."""
 
 
-class Signal(NamedTuple):
+@dataclass(eq=False, slots=True)
+class Signal:
     """A column of times with the column that says what happened, of an input and of a run.
 
     Attributes
@@ -135,7 +125,7 @@ def columns_of(
     heading = block.find_heading(width, facts)
     for row in block.headings:
         # What has half of a row's numbers is no heading, but a row of which nothing can be read.
-        count = sum(is_measured(row.cell(n)) for n in facts)
+        count = sum(vocabulary.is_measured(row.cell(n)) for n in facts)
         if row.line > heading.line and kinds_of(row.cell(0)) and 2 * count >= len(facts):
             file.unread.append(row.line)
             file.rows += 1
@@ -204,12 +194,11 @@ def _read_column(
     is_prefix = sum(x.startswith(f"{prefix}:") for x in heading.texts) > 1
     if rest.strip() and is_prefix and not find_label(prefix, "gate"):
         column.run, name = column.run or prefix.strip(), rest
-    bare = vocabulary.without_accents(name).replace(column.run, "")
+    bare = vocabulary.without_accents(name)
     # Units stand in the heading, or in the row above the data.
     last = [row.cell(n) for row in block.headings[-1:] if name and row.line > heading.line]
     units = [*map(unit_of, [bare, *last, *cells[: "all.timed" in facts]])]
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
-    unit = "" if find_label(unit, "gate") else unit
     is_numbers = form("row of numbers").fullmatch
     numbers = (row.cell(n) for row in block.headings if is_numbers(row.raw))
     column.gate = gate or next(numbers, "")
@@ -225,9 +214,8 @@ def _read_column(
     }
     kind = "timed" if unit in POWERS else {"v": "volt", "": "unitless"}.get(unit, "strange")
     facts |= roles_of_name | facts_held(named) | {kind}
-    column.role = next(
-        role for role, rule in read_rows(__file__, "columns.txt", ":") if holds(rule, facts)
-    )
+    rules = read_rows(__file__, "columns.txt", ":")
+    column.role = next(role for role, rule in rules if vocabulary.holds(rule, facts))
     if column.role in {"time", "elapsed", "time|setting"}:
         column.power = POWERS.get(unit, 0 if "all.stamp" in facts else None)
         column.state = next((state for state in ("clear", "blocked") if state in facts), "")
@@ -243,7 +231,7 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
     kinds, distinct = list(map(kinds_of, texts)), {*texts}
     facts = {f"all.{kind}" for kind in frozenset.intersection(*kinds)}
     facts |= {f"any.{kind}" for kind in frozenset().union(*kinds)}
-    numbers = [*map(float, filter(is_number, texts))]
+    numbers = [*map(float, filter(vocabulary.is_number, texts))]
     steps = {b - a for a, b in itertools.pairwise(numbers)} if "all.number" in facts else {-1.0}
     steps -= {step for step in steps if step < -5e8}  # a counter begins anew
     is_rising = min(steps, default=0.0) >= 0.0 and steps != {0.0}

@@ -6,7 +6,6 @@ import re
 from collections.abc import Callable, Iterable
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
 
 from rig.records import Drop, Edge
 from rig.timers.lines import read_lines
@@ -17,7 +16,7 @@ from rig.timers.vocabulary import LONGEST, is_remark
 
 HEADER = ("run", "channel", "time_s", "state")
 """Of the project's own format, in which every line is a row."""
-_CELLS: tuple[tuple[str, Any, str], ...] = (
+_CELLS: tuple[tuple[str, Callable[[str], int | None], str], ...] = (
     (r"[+]?0*[1-9][0-9]{0,8}", int, "a run: a whole number from 1"),
     (r"(?!1[6-9])1?[0-9]", int, "a channel: 0 to 15"),
     (r"[^:]+", moment, "a time of a drop in seconds"),
@@ -47,19 +46,20 @@ def read_edges(path: str | Path) -> list[Drop]:
         if line.strip() and not is_remark(line)
     )
     next(rows, None)  # the header
-    runs, last = dict[int, list[Any]](), dict[Any, int]()
+    runs, last = dict[int, list[tuple[int, int, bool]]](), dict[tuple[int, int], int]()
     for row in rows:
         if len(row.texts) != len(HEADER):
             problems.add(row.line, 1, "", "wrong_width", values=len(row.texts))
             continue
-        cells = list[Any]()
+        values = list[int]()
         for n, (text, (pattern, read, accepted)) in enumerate(zip(row.texts, _CELLS, strict=True)):
-            cells.append(read(text) if re.fullmatch(pattern, text) else None)
-            if cells[-1] is None:
+            if re.fullmatch(pattern, text) and (value := read(text)) is not None:
+                values.append(value)
+            else:
                 problems.reject(*row.place(n), HEADER[n], text, accepted)
-        if None in cells:
+        if len(values) < len(HEADER):
             continue
-        run, channel, tick, state = cells
+        run, channel, tick, state = values
         edges = runs.setdefault(run, [])
         first = edges[0][0] if edges else tick
         begin, end = last.get((run, channel), first - LONGEST_DROP), first + LONGEST_DROP
@@ -71,7 +71,7 @@ def read_edges(path: str | Path) -> list[Drop]:
             accepted = f"a time from {since} s (the last of channel {channel}) to {until} s"
             problems.reject(*row.place(2), HEADER[2], row.texts[2], accepted)
     problems.raise_if_any()
-    if not any(runs.values()):
+    if not runs:
         problems.refuse(1, "no_edges")
     return [make_drop(run, runs[run]) for run in sorted(runs)]
 

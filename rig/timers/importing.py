@@ -134,8 +134,8 @@ def _find_readings(options: Namespace, gates: Sequence[int], bars: int) -> list[
         try:
             read_file(file)
             file.stated = _read_stated(options, file, gates)
-            possible = [FileReading(file, layout) for layout in find_layouts(file, gates, bars)]
-            readings += [reading for reading in possible if reading.runs]
+            layouts = find_layouts(file, gates, bars)
+            readings += [x for layout in layouts if (x := FileReading(file, layout)).runs]
         except InputError as error:
             faults.append(error)
         if way + 1 >= file.ways:
@@ -143,9 +143,10 @@ def _find_readings(options: Namespace, gates: Sequence[int], bars: int) -> list[
     if not readings:
         if faults:
             raise faults[0]
-        labels = file.labels or ["input"]
-        pairs = ",".join(f"{name}={n}" for name, n in zip(labels, gates, strict=False))
-        values = {"inputs": ", ".join(labels), "channels": ", ".join(map(str, gates))}
+        if not file.labels:
+            raise refusal(options.events, "edges_few", edges=len(file.changes))
+        pairs = ",".join(f"{name}={n}" for name, n in zip(file.labels, gates, strict=False))
+        values = {"inputs": ", ".join(file.labels), "channels": ", ".join(map(str, gates))}
         raise refusal(options.events, "inputs_unclear", **values, pairs=pairs)
     shortest = min(readings, key=lambda reading: reading.longest)
     if shortest.longest > LONGEST_DROP:
@@ -162,24 +163,23 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
     whatever falls say. Of others a drop has to be identified, which is the evidence. What
     contradicts the file is taken only where nothing else fits nearly as well.
     """
-    edges = {
-        hash((*x.edges[["run", "tick", "channel", "blocked"]].tolist(),)): x
-        for x in reversed(readings)
-    }
-    distinct = [*edges.values()][::-1]
-    usual = [reading for reading in distinct if reading.is_whole] or distinct
+    by_edges = dict[int, FileReading]()
+    for reading in readings:
+        edges = reading.edges[["run", "tick", "channel", "blocked"]].tolist()
+        by_edges.setdefault(hash(tuple(edges)), reading)
+    distinct = [*by_edges.values()]
+    usual = [x for x in distinct if x.is_whole and "thousands" not in x.file.facts] or distinct
     if len(usual) == 1 and "channels" in usual[0].file.stated:
         return usual[0], fit(usual[0], True)
     matches = {x: fit(x, False) for x in distinct}
     rough = sorted(distinct, key=lambda x: -matches[x].share)
-    likely = [x for x in rough if matches[x].share >= x.least_share]
-    matches |= {x: fit(x, True) for x in likely[:_FINALISTS]}
+    likely = [x for x in rough if matches[x].share >= x.least_share][:_FINALISTS]
+    matches |= {x: fit(x, True) for x in likely}
     ranked = [x for x in likely if matches[x].evidence and matches[x].share >= x.least_share]
     ranked.sort(key=lambda x: _DECISIVE * x.oddities - matches[x].evidence)
     if not ranked:
-        best = [*likely, *rough][0]
-        is_open = [x for x in rough if x.layout.dark not in {"states", "inverted"}]
-        proposed = list(dict.fromkeys(str(x.layout) for x in [*likely, *is_open]))[:3]
+        best = rough[0]
+        proposed = list(dict.fromkeys(str(x.layout) for x in rough if not x.oddities))[:3]
         run, options = matches[best].worst or min(best.runs), "; ".join([*proposed, "--as-read"])
         values = {"share": 100 * matches[best].share, "run": run, "options": options}
         best.file.problems.refuse(best.runs[run].line.min(), "no_reading_fits", **values)
@@ -244,6 +244,8 @@ def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]
     renamed = ", ".join(f"{name} is run {n}" for name, n in reading.renamed.items())
     if renamed and file.changes.run.any():
         yield make_reason("runs_renamed", runs=renamed)
+    if "thousands" in file.facts:
+        yield make_reason("thousands_parted")
     if layout.pause_s:
         yield make_reason("several_drops", drops=len(reading.runs), pause_s=layout.pause_s)
     if file.period:

@@ -161,7 +161,7 @@ class FileReading:
     def oddities(self) -> int:
         """Count what is contrary to what the file says, or to how files and beams usually are."""
         odd = [x for x in read_rows(__file__) if x[3:] and getattr(self.layout, x[0]) == x[1]]
-        return len(odd) + (not self.is_whole)
+        return len(odd) + (not self.is_whole) + ("thousands" in self.file.facts)
 
     @property
     def is_whole(self) -> bool:

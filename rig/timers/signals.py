@@ -10,15 +10,16 @@ from __future__ import annotations
 import itertools
 import re
 from array import array
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from contextlib import closing
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from rig.arrays import Array
 from rig.reasons import make_reason
-from rig.timers.columns import SAMPLED, TimerColumn, columns_of, pair_columns, roles
+from rig.timers.columns import SAMPLED, Signal, TimerColumn, columns_of, pair_columns, roles
 from rig.timers.crossings import find_crossings
 from rig.timers.lines import is_cut, read_lines
 from rig.timers.moments import HALF_DAY, OVERFLOWS, TICK_HZ, moment
@@ -79,6 +80,7 @@ def read_file(file: TimerFile) -> TimerFile:
         notes = "".join(f"; {note}" for note in file.notes)
         file.problems.refuse(1, "nothing_passes" if file.rows else "no_edges", notes=notes)
     file.notes += [make_reason("last_line_cut")] if is_cut(file.path) else []
+    file.facts |= facts_held({"thousands": table.has_thousands})
     return file
 
 
@@ -102,62 +104,61 @@ class SignalReader:
     def __init__(self, file: TimerFile, block: RowBlock, sample: list[Row]) -> None:
         self.file, self.width = file, max(len(row.texts) for row in sample)
         columns = columns_of(file, block, sample, self.width)
-        self.signals = [*pair_columns(columns)]
-        self.clocks = list(dict.fromkeys(signal.clock for signal in self.signals))
-        self.base, self.latest = block.find_time_base(), dict[int, int]()
+        signals = [*pair_columns(columns)]
+        self.clocks = {x: [*y] for x, y in itertools.groupby(signals, lambda signal: signal.clock)}
+        self.base, self.latest = block.find_time_base(), dict[TimerColumn, int]()
         self.above = dict[str, str]()
-        if self.clocks[0].role != "time" and not self.base[1]:
+        if signals[0].clock.role != "time" and not self.base[1]:
             durations = ", ".join(repr(x.name) for x in columns if x.role == "duration")
             values = {"numbers": durations, "lacks": "a column of times (s, ms, µs, ns) or a rate"}
             line = (block.headings or sample)[0].line
             file.problems.refuse(line, "durations" if durations else "no_rate", **values)
         used = {column.role: column for column in reversed(columns)}
-        is_filled = 2 * sum(value.filled for _, value, _ in self.signals) > len(self.signals)
+        is_filled = 2 * sum(signal.value.filled for signal in signals) > len(signals)
         has_volts = "volts" in used
         self.places = {x: used[x] for x in ("run", "gate") if x in used and not has_volts}
         self.is_sampled = has_volts or ("level" in used and is_filled)
-        self.is_whole = is_filled and (self.is_sampled or len(self.signals) > len(self.clocks))
-        needed = {*self.places.values(), *itertools.chain(*(x[:2] for x in self.signals))}
+        self.is_whole = is_filled and (self.is_sampled or len(signals) > len(self.clocks))
+        needed = {*self.places.values(), *self.clocks, *(signal.value for signal in signals)}
         unused = ", ".join(x.name for x in columns if x.role != "index" and x not in needed)
         file.notes += [make_reason("columns_unused", columns=unused)] if unused else []
         file.lines += [f"  {column}" for column in columns]
         called = {re.sub("[0-9]+", "", clock.name) for clock in self.clocks if not clock.run}
         held = {
             "wide": len(self.clocks) > len(called) == 1 and not self.is_sampled,
-            "guess": file.ways > 1 or any(x.filled <= _SPARSE for x in self.places.values()),
+            "guess": (file.way or file.ways > file.separators)
+            or any(x.filled <= _SPARSE for x in self.places.values()),
             "sampled": self.is_sampled,
         }
         file.facts |= {*self.places, *facts_held(held)}
 
     def read(self, block: RowBlock, rows: Iterable[Row]) -> Records:
         """Return the changes that rows say; a row may say that nothing changes, or be unread."""
-        file, self.block = self.file, block
-        self.starts, self.states = dict[int, int](), dict[Any, str]()
-        self.words, self.times = dict[int, str](), array("d")
-        self.changes, self.samples = list[Any](), [array("d") for _ in self.signals]
-        signals, first = [*enumerate(self.signals)], self.clocks[0].at
-        for self.count, row in enumerate(rows):
-            ticks = {clock.at: self._read_time(row, clock) for clock in self.clocks}
+        file, self.block, self.count, self.steps = self.file, block, 0, array("d")
+        self.starts, self.states = dict[TimerColumn, int](), dict[Any, tuple[str, str]]()
+        self.changes, signals = list[Any](), itertools.chain(*self.clocks.values())
+        self.samples = {x: array("d") for x in signals if x.value.role == "volts"}
+        for row in rows:
             for role, column in self.places.items():
                 # Of merged cells only the first has a text.
                 if (text := row.cell(column.at)) or column.filled > _SPARSE:
                     self.above[role] = text
-            if self.is_sampled and (tick := ticks[first]) is not None:
-                self.times.append(tick - self.starts[first])
-            read = {x.clock.at for n, x in signals if self._read_value(n, row, ticks)}
-            timed = {at for at, tick in ticks.items() if tick is not None}
-            if not read or read != timed or any(row.texts[self.width :]):
+            is_read = {
+                True in {self._read_value(row, tick, signal) for signal in signals}
+                for clock, signals in self.clocks.items()
+                if (tick := self._read_time(row, clock)) is not None
+            }
+            if is_read != {True} or any(row.texts[self.width :]):
                 file.unread.append(row.line)
             if len(self.changes) > MAX_EVENTS:
                 file.problems.refuse(row.line, "too_many_events", limit=MAX_EVENTS)
-        file.rows += self.count + 1
+            self.count += 1
+        file.rows += self.count
         file.last_row = row.line
-        for n, signal in signals:
-            if signal.value.role == "volts":
-                self._find_crossings(n)
-        if self.is_sampled and 2 * len({change[0] for change in self.changes}) < self.count:
-            # Between drops there may be pauses.
-            file.period = int(np.median(np.diff(self.times))) if len(self.times) > 1 else 0
+        for signal, samples in self.samples.items():
+            self._find_crossings(signal, np.array(samples).reshape(-1, 3))
+        if self.is_sampled and 2 * len({change[0] for change in self.changes}) < len(self.steps):
+            file.period = int(np.median(self.steps))  # between drops there may be pauses
         return np.array(self.changes, CHANGE)
 
     def _read_time(self, row: Row, clock: TimerColumn) -> int | None:
@@ -173,67 +174,63 @@ class SignalReader:
             return None
         if clock.role != "time":
             tick = round(self.base[0] * TICK_HZ + self.base[1] * tick)
-        latest = self.latest.get(clock.at, tick)  # of the block above, too: a counter goes on
+        latest = self.latest.get(clock, tick)  # of the block above, too: a counter goes on
         if tick < latest:
             for wrap in HALF_DAY, *(n * 10 ** (12 - (clock.power or 0)) for n in OVERFLOWS):
                 pause = (tick - latest) % wrap
                 tick = latest + pause if 8 * pause < wrap else tick
-        if self.is_sampled and clock.at in self.starts and tick < latest:
+        if self.is_sampled and tick < latest and clock in self.starts and not self.places:
             self.file.problems.add(*row.place(clock.at), "time", "backwards", text=text)
-        self.starts.setdefault(clock.at, tick)
-        self.latest[clock.at] = tick
+        self.starts.setdefault(clock, tick)
+        self.latest[clock] = tick
+        self.steps.append(tick - latest)
         return tick
 
-    def _read_value(self, n: int, row: Row, ticks: Mapping[int, int | None]) -> bool:
+    def _read_value(self, row: Row, tick: int, signal: Signal) -> bool:
         """Keep what a cell says: a sample of volts, or a state if that is a change."""
-        clock, value, _ = self.signals[n]
-        word, tick = row.cell(value.at), ticks[clock.at]
-        if tick is None or not (word or self.is_sampled or value.role == "moment"):
+        value, word = signal.value, row.cell(signal.value.at)
+        if not (word or self.is_sampled or value.role == "moment"):
             return False
-        if self.words.get(n) == word:  # in nearly all rows of levels
-            return True
-        volts = volts_of(word) if value.role == "volts" else None
-        if volts is not None:
-            self.samples[n].extend((row.line, tick - self.starts[clock.at], volts))
+        key = signal, *self.above.values()
+        before, text = self.states.get(key, (None, None))
+        if self.is_whole and word == text:  # in nearly all rows of levels
             return True
         state = meaning_of(value.role, value.words.get(word, word) or value.state)
         if state is None:
             self._reject(row, value, word)
-        elif state or not self.is_sampled:
-            if self.is_whole and not self.places:
-                self.words[n] = word
-            key = n, *self.above.values()
-            before, self.states[key] = self.states.get(key), state
+        elif isinstance(state, float):
+            self.samples[signal].extend((row.line, tick - self.starts[signal.clock], state))
+        elif state or value.role == "moment":
+            self.states[key] = state, word
             if not self.is_whole or before != state:
-                # A first row may be the state at the beginning of a run, and no change.
-                is_first, code = self.is_whole and before is None, STATES.index(state)
-                self.changes.append((row.line, tick, code, *self._place_of(n), is_first))
+                self._add_change(signal, row.line, tick, state, self.is_whole and before is None)
         return True
 
-    def _place_of(self, n: int) -> tuple[int, ...]:
-        """Return run and input, in the row, its heading or a mark above, column and block."""
-        clock, value, label = self.signals[n]
-        run = self.above.get("run") or clock.run or value.run or self.block.run
-        gate = self.above.get("gate") or label or self.block.gate
-        return self.file.names[run], self.file.names[gate], clock.at, self.block.number
+    def _add_change(
+        self, signal: Signal, line: int, tick: int, state: str, is_first: bool = False
+    ) -> None:
+        """Keep a change, or what may be the state at the beginning of a run.
 
-    def _find_crossings(self, n: int) -> None:
+        Its run and input are named in the row, in its heading, or in a mark above.
+        """
+        run = self.above.get("run") or signal.clock.run or signal.value.run or self.block.run
+        gate = self.above.get("gate") or signal.label or self.block.gate
+        place = self.file.names[run], self.file.names[gate], signal.clock.at, self.block.number
+        self.changes.append((line, tick, STATES.index(state), *place, is_first))
+
+    def _find_crossings(self, signal: Signal, samples: Array) -> None:
         """Keep where volts cross the middle; note how many do, or that nothing passes."""
-        clock, _, label = self.signals[n]
-        if not self.samples[n]:
-            self.file.notes.append(make_reason("no_samples", input=label))
-            return
-        samples = np.array(self.samples[n]).reshape(-1, 3)
         level, crossings = find_crossings(samples)
         code, values = "crossings", {"crossings": len(crossings), "level": level}
-        if level is None:
+        if not len(samples):
+            code, values = "no_samples", {}
+        elif level is None:
             code, values = "no_passage", {"low": min(samples[:, 2]), "high": max(samples[:, 2])}
-        self.file.notes.append(make_reason(code, input=label, **values))
+        self.file.notes.append(make_reason(code, input=signal.label, **values))
         # A last value may be cut off.
         for line, offset, is_high in crossings[crossings[:, 0] < self.file.last_row].tolist():
-            state = STATES.index("high" if is_high else "low")
-            tick = self.starts[clock.at] + round(offset)
-            self.changes.append((int(line), tick, state, *self._place_of(n), False))
+            tick = self.starts[signal.clock] + round(offset)
+            self._add_change(signal, int(line), tick, "high" if is_high else "low")
 
     def _reject(self, row: Row, column: TimerColumn, text: str) -> None:
         """Note a cell whose value is not accepted."""
@@ -242,16 +239,18 @@ class SignalReader:
 
 
 @lru_cache(10_000)
-def volts_of(word: str) -> float | None:
-    """Return a number of volts, infinite beyond an instrument's range; `None` for others."""
-    return float(word) if is_number(word) else _BEYOND.get(state_of(word))
+def meaning_of(role: str, word: str) -> str | float | None:
+    """Return what a word means in such a column; `None` if it is not accepted.
 
-
-@lru_cache(10_000)
-def meaning_of(role: str, word: str) -> str | None:
-    """Return one of `STATES`: what a word means in such a column; `None` if it is not accepted."""
+    Returns
+    -------
+    str or float
+        One of `STATES`, or volts, infinite beyond an instrument's range.
+    """
     state, accepted = state_of(word), roles()[role][-1].split()
-    if state in {"unknown", "missing"} and role in {*SAMPLED, "moment"}:
+    if role == "volts" and (is_number(word) or state in _BEYOND):
+        return _BEYOND.get(state) or float(word)
+    if state == "unknown" or (state in {"undefined", "missing"} and role in {*SAMPLED, "moment"}):
         return ""
     state = dict(zip(("zero", "one"), accepted, strict=False)).get(state, state)
     return state if state in accepted else None

@@ -18,14 +18,25 @@ from typing import NamedTuple
 from rig.timers import vocabulary
 from rig.timers.vocabulary import LONGEST, form, is_measured, is_number, kinds_of, roles_in
 
-TimeBase = tuple[float, float]
-"""When the first sample was taken, and the time between two, s."""
 _Shape = tuple[tuple[bool, bool], ...]
 """Of each cell whether it is filled, and a number."""
 _Name = tuple[str, int]
 """Words before a value, and how many values with the same are before it in its line."""
 _UNFILLED = {"setting", "index", "derived"}
 """Roles of columns that may have a name and no values: a rate, comments, or distances."""
+_ROLES = {
+    "time",
+    "elapsed",
+    "state",
+    "edge",
+    "volts",
+    "gate",
+    "run",
+    "duration",
+    "index",
+    "derived",
+}
+"""Those that columns may have."""
 _UNITS = vocabulary.POWERS | {"": 0, "hz": 0, "khz": -3, "mhz": -6, "ghz": -9, "ks/s": -3}
 """Decimal power from seconds, or from hertz."""
 _JUDGED = 100
@@ -72,6 +83,13 @@ class RowBlock:
             self.headings += self.above
         self.key = width, *(tuple(row.texts) for row in self.headings)
 
+    def begin_below(self, mark: str) -> RowBlock:
+        """Begin the block below a mark; a run or gate goes on until a mark names another."""
+        run, gate = (vocabulary.find_label(mark, role) for role in ("run", "gate"))
+        above = self.headings if self.width else [*self.above, *self.headings][:_SAMPLE]
+        number = self.number + (not run and not gate)
+        return RowBlock(self.remarks, above, number, run or self.run, gate or self.gate)
+
     def find_heading(self, width: int, filled: Collection[int]) -> Row:
         """Return the row with most cells that are known, the lowest of those with most names.
 
@@ -88,11 +106,7 @@ class RowBlock:
         remarks = [x for x in self.remarks if len(x.texts) == width < 2 * x.count_known()]
         remarks = [x for x in remarks if not form("assignment").search(x.raw)]
         for row in self.headings or remarks:
-            # A measured number, perhaps of an input that it names: ``CH1:2E-04``.
-            bare = (
-                x.removeprefix(vocabulary.find_label(x, "gate")).lstrip(":= ") for x in row.texts
-            )
-            if any(map(is_measured, bare)) and not form("time and numbers").fullmatch(row.raw):
+            if any(map(is_measured, row.texts)) and not form("time and numbers").fullmatch(row.raw):
                 ranked = [rank for rank in ranked if rank[0] >= len(filled)]
             elif (
                 (known := row.count_known(filled))
@@ -102,7 +116,7 @@ class RowBlock:
                 ranked.append((known, len({*row.texts}), row))
         return max(reversed(ranked), key=lambda rank: rank[:2], default=(0, 0, Row(0, [])))[-1]
 
-    def find_time_base(self) -> TimeBase:
+    def find_time_base(self) -> tuple[float, float]:
         """Return the first sample's time and the step, s, that settings state; 0 without."""
         stated, rows = dict[str, float](), [*self.remarks, *self.headings]
         for above, below in itertools.pairwise([*rows, Row(0, [])]):
@@ -149,12 +163,9 @@ class Row(NamedTuple):
     def count_known(self, columns: Collection[int] | None = None) -> int:
         """Count the cells, of some columns or of all, that say what a column is."""
         texts = [text for n, text in enumerate(self.texts) if columns is None or n in columns]
-        is_known = form("role of a column").fullmatch
-        roles = [{*filter(is_known, roles_in(x)), vocabulary.unit_of(x)} - {""} for x in texts]
-        is_heading = set().union(*roles) - {"derived", "index"} and "units" not in roles_in(
-            texts[0]
-        )
-        return sum(map(bool, roles)) if is_heading else 0
+        roles = [{*(roles_in(x) & _ROLES), vocabulary.unit_of(x)} - {""} for x in texts]
+        is_heading = bool(set().union(*roles) - {"derived", "index"})
+        return sum(map(bool, roles)) if is_heading and "units" not in roles_in(texts[0]) else 0
 
     @property
     def is_mark(self) -> bool:
@@ -193,25 +204,31 @@ class Table:
     ----------
     separator
         Of the cells; a blank stands for any number of blanks, nothing for words between values.
-    remarks
-        Lines that are marked as such, without the mark, as far as read.
+    has_thousands
+        Whether a mark in its numbers parts thousands, though it may be that of decimals.
     strays, words
         Lines among rows that are neither rows nor headings: with a value, or without.
     """
 
     def __init__(self, lines: Iterable[tuple[int, str]], way: int = 0) -> None:
-        self.remarks, self.strays, self.words = list[Row](), list[int](), list[int]()
+        self.strays, self.words = list[int](), list[int]()
         unwrapped = ((number, piece) for number, line in lines for piece in _unwrap(line))
         sample = list(itertools.islice(unwrapped, _SAMPLE))
         self._lines = itertools.chain(sample, unwrapped)
         plain = [line for _, line in sample if line.strip() and not vocabulary.is_remark(line)]
         self._names, named = _find_names(plain)
         separators = find_separators(plain, named)
-        self.ways, self.separator = len(separators), separators[way % len(separators)]
+        self.separator, self.has_thousands = separators[way % len(separators)], False
         self._usual: _Shape = ()
         shapes = Counter(x for x in map(_shape, map(self.split, plain)) if any(map(all, x)))
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
+        # Where each fraction has three digits, falls decide whether its mark parts thousands.
+        texts = itertools.chain(*map(self.split, plain))
+        fractions = [text for text in texts if "fraction" in kinds_of(text)]
+        is_open = any(fractions) and all(map(form("thousands").fullmatch, fractions))
+        self.ways = len(separators) * (1 + is_open)
+        self.has_thousands = is_open and way // len(separators) % 2 > 0
 
     def split(self, line: str) -> list[str]:
         """Split a line into cells; numbers get a decimal point, and what is missing is empty."""
@@ -228,11 +245,13 @@ class Table:
         if form("apart").search(line):
             grouped = form("grouped").fullmatch
             cells = [form("mark of thousands").sub("", x) if grouped(x) else x for x in cells]
+        if self.has_thousands:
+            cells = [re.sub("(?<=[0-9])[.,]", "", text) for text in cells]
         return [text.replace(",", ".") if has_comma(text[:LONGEST]) else text for text in cells]
 
     def rows(self) -> Iterator[Row]:
         """Yield each row of data."""
-        block, is_plain = RowBlock(self.remarks, []), form("plain row").fullmatch
+        block, is_plain = RowBlock(), form("plain row").fullmatch
         if not self.separator:
             block.headings.append(Row(1, [name for name, _ in self._names], "", block))
         for number, line in self._lines:
@@ -244,12 +263,12 @@ class Table:
             mark = form("remark").match(line[:LONGEST])
             text = line[mark.end() :].rstrip('" ') if mark else line
             row = Row(number, self.split(text), line, block)
-            is_mark = not text[:1].isdigit() and row.is_mark
+            is_mark = row.is_mark
             if is_mark or (block.width and not mark and row.is_heading):
-                block = self._next_block(block, line if is_mark else "")
+                block = block.begin_below(line if is_mark else "")
                 block.headings += [] if is_mark else [row]
             elif mark:
-                self.remarks += [row] if number <= _SAMPLE and not block.width else []
+                block.remarks += [row] if number <= _SAMPLE and not block.width else []
             elif not self.separator and len(row.texts) > len(self._names):
                 self.strays.append(row.line)
             elif self._is_row(row):
@@ -263,39 +282,35 @@ class Table:
                     return
                 block.headings.append(row)
 
-    def _next_block(self, last: RowBlock, mark: str) -> RowBlock:
-        """Return the block below a mark; a run or gate goes on until a mark names another."""
-        run, gate = vocabulary.find_label(mark, "run"), vocabulary.find_label(mark, "gate")
-        number = last.number + (not run and not gate)
-        above = (last.headings if last.width else [*last.above, *last.headings])[:_SAMPLE]
-        return RowBlock(self.remarks, above, number, run or last.run, gate or last.gate)
-
     def _is_row(self, row: Row) -> bool:
-        """Whether it has values only, and at least a number or a date, or looks as if it had."""
-        if _begins_as(row.texts, self._usual):  # as most, perhaps with words behind
+        """Whether it is as most rows, or has values only, and at least a number or a time.
+
+        Above rows of several cells may stand a date, or a count. A row of data with a fault is as
+        wide as those above, or as their names.
+        """
+        texts = row.texts
+        if _begins_as(texts, self._usual):  # as most, perhaps with words behind
             return True
-        # Above rows of several cells may stand a date, or a count.
-        is_data = (row.texts[1:] or len(self._usual) < 2) and any(map(is_measured, row.texts))
-        if is_data and all(map(kinds_of, filter(None, row.texts))):
-            return True
-        # One of data with a fault: some of it is a number, as in those above, or below their names.
+        if (len(texts) > 1 or len(self._usual) < 2) and all(map(kinds_of, filter(None, texts))):
+            return any(map(is_measured, texts))
         above = (x.texts for x in row.block.headings if len(x.texts) == x.count_known())
-        widths = {row.block.width, *map(len, above)}
-        is_setting = roles_in(row.texts[0]) & vocabulary.TIME_BASE
-        return any(map(is_number, row.texts)) and len(row.texts) in widths and not is_setting
+        is_wide = len(texts) in {row.block.width, *map(len, above)} and any(map(is_number, texts))
+        return is_wide and not roles_in(texts[0]) & vocabulary.TIME_BASE
 
 
 def split_cells(line: str, separator: str, usual: _Shape = ()) -> list[str]:
     """Split a line into cells, without the blanks and the quotes around them."""
-    if separator == " ":
+    quote = "'" if line.lstrip()[:1] == "'" else '"'
+    if quote in line:
+        (cells,) = csv.reader([line], delimiter=separator, quotechar=quote, skipinitialspace=True)
+    elif separator == " ":
         # A heading has names of several words: two blanks or more part them.
-        cells = [word.strip('":') for word in line.split()]
+        cells = [word.strip(":") for word in line.split()]
         is_row = len(cells) == len(usual) or _begins_as(cells, usual) or all(map(kinds_of, cells))
-        return cells if is_row else re.split(r" {2,}|\t", line.strip())
-    if '"' in line:
-        (cells,) = csv.reader([line], delimiter=separator, skipinitialspace=True)
-        return [text.strip().strip('"').strip() for text in cells]
-    return [text.strip() for text in line.split(separator)]
+        cells = cells if is_row else re.split(r" {2,}|\t", line.strip())
+    else:
+        cells = line.split(separator)
+    return [text.strip().strip('"').strip() for text in cells]
 
 
 def _unwrap(line: str) -> list[str]:

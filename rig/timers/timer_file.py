@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import itertools
 from collections import defaultdict
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -33,7 +32,6 @@ Records: TypeAlias = Any
 """Rows with named fields, a record array."""
 
 
-@dataclass(eq=False, slots=True)
 class TimerFile:
     """What was understood of a file.
 
@@ -58,8 +56,9 @@ class TimerFile:
     facts
         What holds of it: ``sampled``, it has samples, and a level that changes may be of an input
         that is no gate; ``wide``, a row has several times that are called alike, so that each may
-        be of a run; ``guess``, rows lack the name of their run or gate, so that falls decide;
-        ``run`` and ``gate``, rows say them, and a run may go on in another block.
+        be of a run; ``thousands``, a mark that may be that of decimals is taken to part thousands;
+        ``guess``, rows lack the name of their run or gate, so that falls decide; ``run`` and
+        ``gate``, rows say them, and a run may go on in another block.
     rows, last_row
         How many lines of data there are, and the number of the last.
     unread
@@ -72,28 +71,20 @@ class TimerFile:
         Its faults.
     """
 
-    path: str | Path
-    way: int = 0
-    ways: int = 1
-    separators: int = 1
-    lines: list[str] = field(default_factory=list)
-    names: dict[str, int] = field(
-        default_factory=lambda: defaultdict(itertools.count(1).__next__, {"": 0})
-    )
-    changes: Records = field(init=False)
-    period: int | None = None
-    powers: set[int | None] = field(default_factory=set)
-    facts: set[str] = field(default_factory=set)
-    rows: int = 0
-    last_row: int = 0
-    unread: list[int] = field(default_factory=list)
-    notes: list[Reason] = field(default_factory=list)
-    stated: dict[str, Any] = field(default_factory=dict)
-    problems: ProblemList = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Begin without faults."""
-        self.problems = ProblemList(str(self.path), make_reason("timer_files").text)
+    def __init__(self, path: str | Path, way: int = 0) -> None:
+        self.path, self.way = path, way
+        self.ways = self.separators = 1
+        self.names = defaultdict[str, int](itertools.count(1).__next__, {"": 0})
+        self.changes: Records = np.recarray(0, CHANGE)
+        self.period: int | None = None
+        self.powers = set[int | None]()
+        self.facts = set[str]()
+        self.rows = self.last_row = 0
+        self.unread = list[int]()
+        self.lines = list[str]()
+        self.notes = list[Reason]()
+        self.stated = dict[str, Any]()
+        self.problems = ProblemList(str(path), make_reason("timer_files").text)
 
     @property
     def labels(self) -> list[str]:

@@ -55,13 +55,9 @@ def read_video(path: str | Path) -> VideoTrack:
             if not is_number(row.cell(n) or "0"):
                 problems.reject(*row.place(n), name, row.cell(n), "a number")
     problems.raise_if_any()
-    places = np.array(
-        [
-            [float(row.cell(n) or "nan") * _SCALES[name][unit] for row in track]
-            for name, (n, unit) in axes
-        ]
-    )
-    times, x, y = places[:, ~np.isnan(places).any(axis=0)]
+    texts = [[row.cell(n) or "nan" for _, (n, _) in axes] for row in track]
+    places = np.array(texts, float) * [_SCALES[name][unit] for name, (_, unit) in axes]
+    times, x, y = places[~np.isnan(places).any(axis=1)].T
     if times.size < FEWEST or not np.all(np.diff(times) > 0):
         problems.refuse(1, "few_frames", frames=times.size, needed=FEWEST)
     return VideoTrack(times, x, y, len(rows) + len(table.strays) - len(track))

@@ -17,11 +17,11 @@ TIME_BASE = {"start", "step", "rate"}
 LONGEST = 200
 """Characters: no cell, and no line of named values, is longer."""
 
-_STATES = "one", "zero", "blocked", "clear", "high", "low", "above", "below", "unknown", "missing"
-_KINDS = "number", "comma number", "clock", "timed", "input"
-_DETAILS = "whole", "bit", "count", "fraction", "stamp"
 _FAMILIES = {"blocked": "beam", "clear": "beam", "high": "signal", "low": "signal"}
 """Of what a state is; of others than these the file does not say."""
+_STATES = "one", "zero", *_FAMILIES, "above", "below", "unknown", "undefined", "missing"
+_KINDS = "number", "comma number", "clock", "timed", "input"
+_DETAILS = "whole", "bit", "count", "fraction", "stamp"
 
 
 @cache
@@ -101,7 +101,7 @@ def state_of(text: str) -> str:
     -------
     str
         ``one``, ``zero``, ``blocked``, ``clear``, ``high``, ``low``, ``above``, ``below`` (of what
-        is measured), ``unknown``, ``missing``, or an empty text.
+        is measured), ``unknown``, ``undefined`` (of a level), ``missing``, or an empty text.
     """
     word = without_accents(text[:80]).casefold()
     word = re.sub(r"(?<=[01])[.,]0{0,30}(?:e[+-]?0{1,3})?$", "", word)

@@ -165,7 +165,7 @@ NOT_READ = {
     "Minutes and seconds", "Seconds that are called minutes",
     "More names than columns", "Samples with an index",
     "Two tables", "Twice the same", "Changes in nanoseconds",
-    "Thousands by points", "Microseconds as if they were seconds",
+    "Microseconds as if they were seconds",
     "The last row cut", "A row twice", "An unknown column in a unit of time",
 }  # fmt: skip
 """Refused with what to do: the file leaves open, or contradicts, what is in it."""
