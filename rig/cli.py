@@ -22,7 +22,6 @@ INTERRUPTED = 130
 OPTIONAL = ("distributed", "minisign", "mpmath", "weasyprint")
 """Packages that few need: clusters for `rig sweep`, signatures, 50 digits for some of `rig bench`,
 a report as PDF."""
-_PIP_NAMES = {"minisign": "py-minisign"}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -103,7 +102,7 @@ def _refusal(error: BaseException) -> int:
         if package in OPTIONAL:
             from shlex import quote  # noqa: PLC0415 - never needed otherwise
 
-            name = _PIP_NAMES.get(package, package)
+            name = "py-minisign" if package == "minisign" else package
             say(f"rig: this needs {name}: {quote(sys.executable)} -m pip install {name}")
             return BAD_INPUT
     if not isinstance(error, OSError):

@@ -3,22 +3,13 @@
 Mechanics that a scene does not have are not loaded.
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from rig.measurands import ACCELERATION, FALL_TIME, GRAVITY, SEPARATION, SPEED, Measurand
-from rig.model.fall import air_legs
-from rig.model.prediction import PredictedIncline
+from rig.measurands import ACCELERATION, FALL_TIME, GRAVITY, SEPARATION, SPEED
+from rig.model.prediction import PredictedIncline, group_notes, predict_free_fall
 from rig.protocol.contact import as_struck, at_contact
+from rig.protocol.protocol import Protocol, RodChain, Run
 from rig.units import Quantity
-
-if TYPE_CHECKING:
-    from rig.model.chain import Chain
-    from rig.model.surface import Surface
-    from rig.protocol.protocol import Protocol, RodChain, Run
 
 
 def predictions(protocol: Protocol) -> list[PredictedIncline]:
@@ -88,16 +79,7 @@ def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
         return {row.name: protocol.gravity}
     model = predict_incline(protocol, run.incline_deg, run.impact)
     rows = (SEPARATION, SPEED, FALL_TIME) if run.free is not None else (SPEED, FALL_TIME)
-    return quantities(model, *rows)
-
-
-def quantities(model: PredictedIncline, *rows: Measurand) -> dict[str, Quantity]:
-    """Return what a prediction says of some measurands, by JSON name, where it has an answer."""
-    return {
-        row.name: Quantity(value, getattr(model, row.key("u")) or 0.0)
-        for row in rows
-        if (value := getattr(model, row.name)) is not None
-    }
+    return model.quantities(*rows)
 
 
 def coefficient_slopes(protocol: Protocol, run: Run) -> dict[str, dict[str, float]]:
@@ -113,16 +95,15 @@ def coefficient_slopes(protocol: Protocol, run: Run) -> dict[str, dict[str, floa
 
     struck, stated = run.impact, protocol.surface
     assert stated is not None
-    rods = protocol.chains[struck]
-
-    def predicted_with(surface: Surface, chain: Chain) -> dict[str, Quantity]:
-        chains = {**protocol.chains, struck: replace(rods, chain=chain)}
-        return predicted_run(replace(protocol, surface=surface, chains=chains), run)
-
+    chains, rods = protocol.chains, protocol.chains[struck]
     slopes: dict[str, dict[str, float]] = {}
     for name, low, high, share in moved_coefficients(stated, rods.chain, run.incline_deg):
         own = f"alpha {protocol.condition(run).impact_chain}" if name == ALPHA else name
-        below, above = predicted_with(*low), predicted_with(*high)
+        scenes = (
+            replace(protocol, surface=surface, chains=chains | {struck: replace(rods, chain=chain)})
+            for surface, chain in (low, high)
+        )
+        below, above = (predicted_run(scene, run) for scene in scenes)
         for measurand in below.keys() & above.keys():
             difference = above[measurand].value - below[measurand].value
             slopes.setdefault(measurand, {})[own] = share * difference
@@ -134,32 +115,13 @@ def notes(protocol: Protocol) -> list[str]:
     return [*protocol.notes.splitlines(), *group_notes(predictions(protocol))]
 
 
-def group_notes(lines: Sequence[PredictedIncline]) -> list[str]:
-    """Write each note once, with the inclines that have it."""
-    labels: dict[str, list[str]] = {}
-    for line in lines:
-        for note in line.notes:
-            labels.setdefault(note, []).append(line.label)
-    return [f"{', '.join(inclines)}: {note}" for note, inclines in labels.items()]
-
-
 def _free_fall(protocol: Protocol) -> PredictedIncline:
     """Predict the fall of a chain that strikes nothing."""
     ((name, rods),) = protocol.chains.items()
-    length = protocol.drop.value + rods.chain.length
-    start, gravity = protocol.initial_speed.value, protocol.gravity.value
-    speed, time = air_legs(air_of(protocol, name))(length, start, gravity, 0)
     scene = "free fall" if protocol.track is None else "track"
-    return PredictedIncline(
-        incline_deg=0.0,
-        model=f"{scene}{', drag' if protocol.drag is not None else ''}",
-        speed_m_s=speed,
-        fall_time_s=time,
-        free_fall_speed_m_s=speed,
-        in_domain=True,
-        notes=[],
-        struck=False,
-    )
+    length = protocol.drop.value + rods.chain.length
+    gravity, start = protocol.gravity.value, protocol.initial_speed.value
+    return predict_free_fall(scene, length, gravity, start, air_of(protocol, name))
 
 
 def air_of(protocol: Protocol, name: str) -> list[float]:
