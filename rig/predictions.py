@@ -23,7 +23,11 @@ def predictions(protocol: Protocol) -> list[PredictedIncline]:
 
 def _predict_scene(protocol: Protocol) -> list[PredictedIncline]:
     if protocol.surface is None:
-        return [_free_fall(protocol)]
+        ((name, rods),) = protocol.chains.items()
+        scene = "free fall" if protocol.track is None else "track"
+        length = protocol.drop.value + rods.chain.length
+        gravity, start = protocol.gravity.value, protocol.initial_speed.value
+        return [predict_free_fall(scene, length, gravity, start, air_of(protocol, name))]
     inclines, unlike = dict.fromkeys(protocol.plan.inclines), protocol.unlike_chains
     return [
         replace(predict_incline(protocol, at, struck), impact_chain=struck if unlike else None)
@@ -90,38 +94,23 @@ def coefficient_slopes(protocol: Protocol, run: Run) -> dict[str, dict[str, floa
     protocol = protocol.of(run)
     if run.impact is None:
         return {name: {"gravity": model.u} for name, model in predicted_run(protocol, run).items()}
-    from rig.model.impact import ALPHA  # noqa: PLC0415 - only where something is struck
-    from rig.model.predict import moved_coefficients  # noqa: PLC0415 - likewise
+    from rig.model.impact import ALPHA, COEFFICIENTS  # noqa: PLC0415 - only where one is struck
 
-    struck, stated = run.impact, protocol.surface
-    assert stated is not None
-    chains, rods = protocol.chains, protocol.chains[struck]
-    slopes: dict[str, dict[str, float]] = {}
-    for name, low, high, share in moved_coefficients(stated, rods.chain, run.incline_deg):
-        own = f"alpha {protocol.condition(run).impact_chain}" if name == ALPHA else name
-        scenes = (
-            replace(protocol, surface=surface, chains=chains | {struck: replace(rods, chain=chain)})
-            for surface, chain in (low, high)
-        )
-        below, above = (predicted_run(scene, run) for scene in scenes)
-        for measurand in below.keys() & above.keys():
-            difference = above[measurand].value - below[measurand].value
-            slopes.setdefault(measurand, {})[own] = share * difference
-    return slopes
+    alpha = f"alpha {protocol.condition(run).impact_chain}"
+    model = predict_incline(protocol, run.incline_deg, run.impact)
+    return {
+        measurand: {
+            alpha if name == ALPHA else name: slopes[name]
+            for name in COEFFICIENTS
+            if name in slopes
+        }
+        for measurand, slopes in model.slopes.items()
+    }
 
 
 def notes(protocol: Protocol) -> list[str]:
     """Its author's notes, and those on planned inclines, the same of several together."""
     return [*protocol.notes.splitlines(), *group_notes(predictions(protocol))]
-
-
-def _free_fall(protocol: Protocol) -> PredictedIncline:
-    """Predict the fall of a chain that strikes nothing."""
-    ((name, rods),) = protocol.chains.items()
-    scene = "free fall" if protocol.track is None else "track"
-    length = protocol.drop.value + rods.chain.length
-    gravity, start = protocol.gravity.value, protocol.initial_speed.value
-    return predict_free_fall(scene, length, gravity, start, air_of(protocol, name))
 
 
 def air_of(protocol: Protocol, name: str) -> list[float]:

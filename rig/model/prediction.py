@@ -1,7 +1,7 @@
 """The model's prediction for a scene, with or without a surface."""
 
-from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from rig.measurands import Measurand
@@ -26,6 +26,8 @@ class PredictedIncline:
         Time until the top rod strikes, and its speed then without any impacts.
     in_domain, notes
         Whether the case is in the model's domain, and remarks.
+    slopes
+        By measurand and input, the change of Δz, V and t with one standard uncertainty of it.
     struck
         Whether the scene has a surface; without a surface there are no uncertainties.
     """
@@ -45,6 +47,7 @@ class PredictedIncline:
     free_fall_speed_m_s: float
     in_domain: bool
     notes: list[str]
+    slopes: Mapping[str, Mapping[str, float]] = field(default_factory=dict, repr=False)
     struck: bool = True
 
     @property
@@ -63,7 +66,7 @@ class PredictedIncline:
 
     def json(self) -> dict[str, Any]:
         """Return the object that ``rig predict --json`` prints, without absent quantities."""
-        absent = {"struck", "fall_time_u_s"}
+        absent = {"slopes", "struck", "fall_time_u_s"}
         absent |= set() if self.struck else {"separation_u_m", "speed_u_m_s"}
         absent |= {name for name in ("impact_chain", "setting") if not getattr(self, name)}
         return {name: value for name, value in asdict(self).items() if name not in absent}
