@@ -156,15 +156,15 @@ def remedies(reasons: Iterable[Reason]) -> list[str]:
 
 
 def summarize_reasons(reasons: Sequence[Reason]) -> str:
-    """Return the sentence of reasons of one kind; their label where they are not all the same."""
+    """Return the sentence of reasons of one kind; where they are not all the same, their label.
+
+    Behind the label stands what tells them from others of their code.
+    """
     first = reasons[0]
-    return first.text if all(reason == first for reason in reasons) else _label(first)
-
-
-def _label(reason: Reason) -> str:
-    """Return a reason's label, with what tells it from others of its code."""
-    words = ", ".join(value for value in reason.values.values() if isinstance(value, str))
-    label = WORDINGS[reason.code].label or reason.code.replace("_", " ")
+    if all(reason == first for reason in reasons):
+        return first.text
+    words = ", ".join(value for value in first.values.values() if isinstance(value, str))
+    label = WORDINGS[first.code].label or first.code.replace("_", " ")
     return f"{label} ({words})" if words else label
 
 
