@@ -125,8 +125,8 @@ def _add_argument(parser: Parser, row: str, kinds: dict[str, dict[str, Any]]) ->
         flags.append(metavar)
     else:
         options["metavar"] = metavar
+    name = flags[-1].strip("-").replace("-", "_")
     place: argparse._ActionsContainer = parser
-    rules = []
     for word in words.split():
         kind, _, detail = word.partition(":")
         if word.startswith("="):
@@ -137,7 +137,7 @@ def _add_argument(parser: Parser, row: str, kinds: dict[str, dict[str, Any]]) ->
         elif word in {"?", "*", "+"}:
             options["nargs"] = word
         elif kind in {"with", "without"}:
-            rules += [(kind, other) for other in detail.split(",")]
+            parser.rules += [(name, kind, other) for other in detail.split(",")]
         elif kind in {"either", "one-of"}:
             if not parser._mutually_exclusive_groups:
                 parser.add_mutually_exclusive_group(required=kind == "one-of")
@@ -146,10 +146,9 @@ def _add_argument(parser: Parser, row: str, kinds: dict[str, dict[str, Any]]) ->
             options |= kinds[kind]
             if detail:
                 options["type"] = partial(options["type"], detail)
-    action = place.add_argument(*flags, **options)
-    label = metavar if metavar.lower() == action.dest else names
-    parser.labels[action.dest] = flags[-1] if action.option_strings else label
-    parser.rules += [(action.dest, *rule) for rule in rules]
+    place.add_argument(*flags, **options)
+    label = metavar if metavar.lower() == name else names
+    parser.labels[name] = flags[-1] if flags[-1].startswith("-") else label
 
 
 def _number(text: str) -> int | str:

@@ -3,6 +3,7 @@
 Mechanics that a scene does not have are not loaded.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from rig.measurands import ACCELERATION, FALL_TIME, GRAVITY, SEPARATION, SPEED
@@ -86,26 +87,19 @@ def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
     return model.quantities(*rows)
 
 
-def coefficient_slopes(protocol: Protocol, run: Run) -> dict[str, dict[str, float]]:
-    """Return by how much each prediction moves with each coefficient, by its standard uncertainty.
+def coefficient_slopes(protocol: Protocol, run: Run) -> dict[str, Mapping[str, float]]:
+    """Return by coefficient how much its standard uncertainty moves each prediction.
 
     What else a prediction is made from, measuring needs too: the drop's own equations know that.
     """
     protocol = protocol.of(run)
     if run.impact is None:
-        return {name: {"gravity": model.u} for name, model in predicted_run(protocol, run).items()}
-    from rig.model.impact import ALPHA, COEFFICIENTS  # noqa: PLC0415 - only where one is struck
+        return {"gravity": {name: g.u for name, g in predicted_run(protocol, run).items()}}
+    from rig.model.impact import ALPHA  # noqa: PLC0415 - only where something is struck
 
-    alpha = f"alpha {protocol.condition(run).impact_chain}"
-    model = predict_incline(protocol, run.incline_deg, run.impact)
-    return {
-        measurand: {
-            alpha if name == ALPHA else name: slopes[name]
-            for name in COEFFICIENTS
-            if name in slopes
-        }
-        for measurand, slopes in model.slopes.items()
-    }
+    own = f"alpha {protocol.condition(run).impact_chain}"
+    slopes = predict_incline(protocol, run.incline_deg, run.impact).slopes
+    return {own if name == ALPHA else name: changes for name, changes in slopes.items()}
 
 
 def notes(protocol: Protocol) -> list[str]:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
     Number = TypeVar("Number", float, Array)
 
-COEFFICIENTS = ALPHA, BETA, MU, PILE = "alpha", "restitution", "friction", "pile_restitution"
+ALPHA, BETA, MU, PILE = "alpha", "restitution", "friction", "pile_restitution"
 """Names of the coefficients that a protocol states."""
 _BASES = {(ALPHA,): "given", (PILE,): "pile", (BETA,): "level", (BETA, MU): "surface"}
 

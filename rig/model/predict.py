@@ -1,6 +1,5 @@
 """Predictions with uncertainty for one chain on one surface."""
 
-import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -86,20 +85,25 @@ def predict(
         "speed": steps(initial_speed, least=0.0),
         "drag": steps(Quantity(1.0, drag_u), least=0.0),
     }
-    of_release = ((name, *ends) for name, pairs in moves.items() for ends in pairs)
-    slopes: dict[str, dict[str, float]] = {row.name: {} for row in ENDS}
+
+    def changes(moved: str, low: float, high: float, weight: float) -> dict[str, float]:
+        before, after = fall_with(**{moved: low}), fall_with(**{moved: high})
+        return {
+            row.name: (getattr(after, name) - getattr(before, name)) * weight
+            for row, name in ENDS.items()
+        }
+
+    slopes: dict[str, dict[str, float]] = {}
     try:
-        of_alpha = _moved_alphas(chain, surface, incline_deg)
-        for name, low, high, weight in itertools.chain(of_alpha, of_release):
-            moved = name if name in moves else ALPHA
-            before, after = fall_with(**{moved: low}), fall_with(**{moved: high})
-            for row, end_name in ENDS.items():
-                change = getattr(after, end_name) - getattr(before, end_name)
-                slopes[row.name][name] = change * weight
+        for name, *ends in _moved_alphas(chain, surface, incline_deg):
+            slopes[name] = changes(ALPHA, *ends)
+        of_release = [changes(name, *ends) for name, pairs in moves.items() for ends in pairs]
     except DomainError as error:
         notes.append(f"no uncertainty: within that of μ, {error.message}")
     else:
-        values |= {row.key("u"): math.hypot(*slopes[row.name].values()) for row in ENDS}
+        all_changes = [*slopes.values(), *of_release]
+        for row in ENDS:
+            values[row.key("u")] = math.hypot(*(change[row.name] for change in all_changes))
     if impact.basis == "pile":
         notes.append("rods gather on a pile: taken as level with the pile's restitution")
     basis = "" if impact.basis in {"surface", "level"} else f", {impact.basis}"

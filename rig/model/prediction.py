@@ -27,7 +27,7 @@ class PredictedIncline:
     in_domain, notes
         Whether the case is in the model's domain, and remarks.
     slopes
-        By measurand and input, the change of Δz, V and t with one standard uncertainty of it.
+        By input of α, the change of each measurand with one standard uncertainty of it.
     struck
         Whether the scene has a surface; without a surface there are no uncertainties.
     """
