@@ -4,7 +4,7 @@ import os
 import sys
 from collections.abc import Callable, Mapping
 from getpass import getpass
-from typing import TypeVar
+from typing import SupportsBytes, TypeVar
 
 from minisign import Error, PublicKey, SecretKey, Signature
 
@@ -78,5 +78,5 @@ def _read_key(path: str | os.PathLike[str], read: Callable[[bytes], Key]) -> Key
         return read(read_input(path, _LONGEST))
 
 
-def _text(part: object) -> bytes:
-    return bytes(part) + b"\n"  # type: ignore[call-overload, no-any-return]
+def _text(part: SupportsBytes) -> bytes:
+    return bytes(part) + b"\n"

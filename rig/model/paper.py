@@ -7,7 +7,7 @@ from operator import mul
 
 import numpy as np
 
-from rig.model.chain import Chain
+from rig.model.chain import Chain, equal_gaps
 from rig.model.continuum import UniformChain, end, end_speed, separation_leading_order
 from rig.model.fall import Fall, Hit, fall, free_leg, hits, kicks
 from rig.model.impact import Impact, alpha_inclined, alpha_level, impact_on
@@ -37,10 +37,7 @@ TEXT_FOUNTAIN_ALPHAS = 0.10, 0.12
 
 def graded_chain() -> Chain:
     """Return the chain of Fig. 4: thinner rods towards the top, equal gaps, mass ∝ d²."""
-    halves = [(lower + upper) / 2 for lower, upper in pairwise(GRADED_DIAMETERS)]
-    gap = (LENGTH - sum(halves)) / len(halves)
-    heights = (*accumulate((gap + half for half in halves[:-1]), initial=0.0), LENGTH)
-    return Chain(tuple(d**2 for d in GRADED_DIAMETERS), heights)
+    return Chain(tuple(d**2 for d in GRADED_DIAMETERS), equal_gaps(GRADED_DIAMETERS, LENGTH))
 
 
 def graded_fall() -> tuple[list[Hit], list[float]]:
