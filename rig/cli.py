@@ -49,9 +49,7 @@ def _run(argv: Sequence[str] | None) -> int:
         seen = all(stream and stream.isatty() for stream in (sys.stdin, sys.stdout))
         return _carry_out((sys.argv[1:] if argv is None else [*argv]) or ["tui"] * seen, struck)
     except RigError as error:
-        from rig.command_help import runnable  # noqa: PLC0415 - `rig --help` needs none of it
-
-        say(runnable(str(error)))
+        say(str(error))
         return error.exit_code
     except (KeyboardInterrupt, Exception) as error:
         # What Ctrl-C strikes may end otherwise: a class in the making turns it into a RuntimeError,
