@@ -1,7 +1,5 @@
 """``python -m rig``, and the ``rig`` command. To import it makes Ctrl-C end the process."""
 
-from __future__ import annotations
-
 _INTERRUPTED = 130
 try:
     import os

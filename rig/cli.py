@@ -22,7 +22,6 @@ INTERRUPTED = 130
 OPTIONAL = ("distributed", "minisign", "mpmath", "weasyprint")
 """Packages that few need: clusters for `rig sweep`, signatures, 50 digits for some of `rig bench`,
 a report as PDF."""
-_PIP_NAMES = {"minisign": "py-minisign"}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -50,9 +49,7 @@ def _run(argv: Sequence[str] | None) -> int:
         seen = all(stream and stream.isatty() for stream in (sys.stdin, sys.stdout))
         return _carry_out((sys.argv[1:] if argv is None else [*argv]) or ["tui"] * seen, struck)
     except RigError as error:
-        from rig.command_help import runnable  # noqa: PLC0415 - `rig --help` needs none of it
-
-        say(runnable(str(error)))
+        say(str(error))
         return error.exit_code
     except (KeyboardInterrupt, Exception) as error:
         # What Ctrl-C strikes may end otherwise: a class in the making turns it into a RuntimeError,
@@ -103,7 +100,7 @@ def _refusal(error: BaseException) -> int:
         if package in OPTIONAL:
             from shlex import quote  # noqa: PLC0415 - never needed otherwise
 
-            name = _PIP_NAMES.get(package, package)
+            name = "py-minisign" if package == "minisign" else package
             say(f"rig: this needs {name}: {quote(sys.executable)} -m pip install {name}")
             return BAD_INPUT
     if not isinstance(error, OSError):

@@ -1,41 +1,13 @@
 """The command line as ``command_help.txt`` describes it: the parser, its help and its mistakes."""
 
 import argparse
-import os
-import re
-import sys
 from collections.abc import Sequence
-from functools import cache, partial
-from shlex import quote
+from functools import partial
 from typing import Any, NoReturn
 
 from rig import __version__
 from rig.command_page import COMMANDS, first_help
 from rig.streams import say
-
-_NAMED = rf"(?<![\w/.-])rig (?=(?:{'|'.join(COMMANDS)}|--help)(?![\w:-]))"
-"""A command, but not the name that begins a program's own narration, as in ``rig daemon:``."""
-
-
-def runnable(text: str) -> str:
-    """Write each command of a text as this user can run it.
-
-    Before anybody activates the environment of `./run demo`, that is ``.venv/bin/rig check``.
-    """
-    return re.sub(_NAMED, lambda _: f"{_program()} ", text)
-
-
-@cache
-def _program() -> str:
-    from shutil import which  # noqa: PLC0415 - only for what names a command
-
-    installed = os.path.join(os.path.dirname(sys.executable), "rig")  # noqa: PTH118, PTH120
-    if which("rig"):
-        return "rig"
-    if which(installed) is None:
-        return f"{quote(sys.executable)} -m rig"
-    here = os.path.relpath(installed)
-    return quote(installed if here.startswith(os.pardir) else here)
 
 
 def _join_pairs(typed: Sequence[str]) -> list[str]:
@@ -100,7 +72,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong and where help is, and end."""
-        say(runnable(f"{self.prog}: {message}\n{self.format_usage()}  hint: {self.prog} --help"))
+        say(f"{self.prog}: {message}\n{self.format_usage()}  hint: {self.prog} --help")
         self.exit(2)
 
 
@@ -125,8 +97,8 @@ def _add_argument(parser: Parser, row: str, kinds: dict[str, dict[str, Any]]) ->
         flags.append(metavar)
     else:
         options["metavar"] = metavar
+    name = flags[-1].strip("-").replace("-", "_")
     place: argparse._ActionsContainer = parser
-    rules = []
     for word in words.split():
         kind, _, detail = word.partition(":")
         if word.startswith("="):
@@ -137,7 +109,7 @@ def _add_argument(parser: Parser, row: str, kinds: dict[str, dict[str, Any]]) ->
         elif word in {"?", "*", "+"}:
             options["nargs"] = word
         elif kind in {"with", "without"}:
-            rules += [(kind, other) for other in detail.split(",")]
+            parser.rules += [(name, kind, other) for other in detail.split(",")]
         elif kind in {"either", "one-of"}:
             if not parser._mutually_exclusive_groups:
                 parser.add_mutually_exclusive_group(required=kind == "one-of")
@@ -146,10 +118,9 @@ def _add_argument(parser: Parser, row: str, kinds: dict[str, dict[str, Any]]) ->
             options |= kinds[kind]
             if detail:
                 options["type"] = partial(options["type"], detail)
-    action = place.add_argument(*flags, **options)
-    label = metavar if metavar.lower() == action.dest else names
-    parser.labels[action.dest] = flags[-1] if action.option_strings else label
-    parser.rules += [(action.dest, *rule) for rule in rules]
+    place.add_argument(*flags, **options)
+    label = metavar if metavar.lower() == name else names
+    parser.labels[name] = flags[-1] if flags[-1].startswith("-") else label
 
 
 def _number(text: str) -> int | str:

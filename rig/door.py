@@ -38,20 +38,6 @@ from rig.results.together import MeanDifference, TogetherResults, results_togeth
 from rig.results.whole import SessionResults, calibration, protocol_of, results
 from rig.session.store import Session
 
-__all__ = [
-    "Edges",
-    "MeanDifference",
-    "MeanResult",
-    "PredictedIncline",
-    "RecordedSession",
-    "RecordedSessions",
-    "Results",
-    "RunResult",
-    "open",
-    "predict",
-    "read_protocol",
-]
-
 
 def open(path: str | os.PathLike[str]) -> RecordedSession:  # noqa: A001 - it is rig.open
     """Open a session for reading.

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from rig.errors import InputError
+from rig.reasons import errors_become
 
 _KINDS = {"d": "a folder", "p": "a pipe", "s": "a socket", "c": "a device", "b": "a device"}
 """What is no file, by the letter that ``ls -l`` has for it."""
@@ -123,16 +124,11 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         As in `write_atomic`.
     """
     path_given, target = Path(path), Path(os.path.realpath(path))  # a pipe has no real path
-    try:
+    with errors_become("file_unwritten", OSError, path=path):
         check_place(path)
         through = path_given.exists() and not path_given.is_file()
         with path_given.open("wb") if through else _replacing(target) as stream:
             yield stream
-    except OSError as error:
-        raise InputError(
-            f"cannot write {path}: {error.strerror or error}",
-            "choose another place, or free some space there; an older file was left as it was",
-        ) from error
 
 
 def state_folder() -> Path:
@@ -143,10 +139,8 @@ def state_folder() -> Path:
     InputError
         This user has no home.
     """
-    try:
+    with errors_become("no_state_folder", RuntimeError):
         return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "chainrig"
-    except RuntimeError as error:
-        raise InputError(f"no folder for logs: {error}", "set XDG_STATE_HOME") from error
 
 
 def file_stamp(path: Path) -> tuple[tuple[int, int, int], ...]:
@@ -168,10 +162,8 @@ def make_folder(path: str | os.PathLike[str]) -> Path:
         If it cannot be made.
     """
     folder = Path(path)
-    try:
+    with errors_become("folder_unmade", OSError, path=folder):
         folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot make the folder {folder}: {error.strerror or error}") from error
     return folder
 
 

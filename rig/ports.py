@@ -112,6 +112,5 @@ def _split(url: str) -> SplitResult:
 
 def _with_settings(url: str, settings: dict[str, str], **usual: str) -> str:
     """Write a URL with other settings, and what they lack of the usual ones behind them."""
-    parts, query = _split(url), urlencode({**settings, **usual, **settings}, errors=_BYTES)
-    # urlunsplit would drop the empty authority that pyserial looks for.
-    return f"{parts.scheme}://{parts.netloc}{parts.path}?{query}"
+    query = urlencode({**settings, **usual, **settings}, errors=_BYTES)
+    return f"{_split(url).scheme}://?{query}"

@@ -3,22 +3,14 @@
 Mechanics that a scene does not have are not loaded.
 """
 
-from __future__ import annotations
-
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from rig.measurands import ACCELERATION, FALL_TIME, GRAVITY, SEPARATION, SPEED, Measurand
-from rig.model.fall import air_legs
-from rig.model.prediction import PredictedIncline
+from rig.measurands import ACCELERATION, FALL_TIME, GRAVITY, SEPARATION, SPEED
+from rig.model.prediction import PredictedIncline, group_notes, predict_free_fall
 from rig.protocol.contact import as_struck, at_contact
+from rig.protocol.protocol import Protocol, RodChain, Run
 from rig.units import Quantity
-
-if TYPE_CHECKING:
-    from rig.model.chain import Chain
-    from rig.model.surface import Surface
-    from rig.protocol.protocol import Protocol, RodChain, Run
 
 
 def predictions(protocol: Protocol) -> list[PredictedIncline]:
@@ -32,7 +24,11 @@ def predictions(protocol: Protocol) -> list[PredictedIncline]:
 
 def _predict_scene(protocol: Protocol) -> list[PredictedIncline]:
     if protocol.surface is None:
-        return [_free_fall(protocol)]
+        ((name, rods),) = protocol.chains.items()
+        scene = "free fall" if protocol.track is None else "track"
+        length = protocol.drop.value + rods.chain.length
+        gravity, start = protocol.gravity.value, protocol.initial_speed.value
+        return [predict_free_fall(scene, length, gravity, start, air_of(protocol, name))]
     inclines, unlike = dict.fromkeys(protocol.plan.inclines), protocol.unlike_chains
     return [
         replace(predict_incline(protocol, at, struck), impact_chain=struck if unlike else None)
@@ -88,78 +84,27 @@ def predicted_run(protocol: Protocol, run: Run) -> dict[str, Quantity]:
         return {row.name: protocol.gravity}
     model = predict_incline(protocol, run.incline_deg, run.impact)
     rows = (SEPARATION, SPEED, FALL_TIME) if run.free is not None else (SPEED, FALL_TIME)
-    return quantities(model, *rows)
+    return model.quantities(*rows)
 
 
-def quantities(model: PredictedIncline, *rows: Measurand) -> dict[str, Quantity]:
-    """Return what a prediction says of some measurands, by JSON name, where it has an answer."""
-    return {
-        row.name: Quantity(value, getattr(model, row.key("u")) or 0.0)
-        for row in rows
-        if (value := getattr(model, row.name)) is not None
-    }
-
-
-def coefficient_slopes(protocol: Protocol, run: Run) -> dict[str, dict[str, float]]:
-    """Return by how much each prediction moves with each coefficient, by its standard uncertainty.
+def coefficient_slopes(protocol: Protocol, run: Run) -> dict[str, Mapping[str, float]]:
+    """Return by coefficient how much its standard uncertainty moves each prediction.
 
     What else a prediction is made from, measuring needs too: the drop's own equations know that.
     """
     protocol = protocol.of(run)
     if run.impact is None:
-        return {name: {"gravity": model.u} for name, model in predicted_run(protocol, run).items()}
+        return {"gravity": {name: g.u for name, g in predicted_run(protocol, run).items()}}
     from rig.model.impact import ALPHA  # noqa: PLC0415 - only where something is struck
-    from rig.model.predict import moved_coefficients  # noqa: PLC0415 - likewise
 
-    struck, stated = run.impact, protocol.surface
-    assert stated is not None
-    rods = protocol.chains[struck]
-
-    def predicted_with(surface: Surface, chain: Chain) -> dict[str, Quantity]:
-        chains = {**protocol.chains, struck: replace(rods, chain=chain)}
-        return predicted_run(replace(protocol, surface=surface, chains=chains), run)
-
-    slopes: dict[str, dict[str, float]] = {}
-    for name, low, high, share in moved_coefficients(stated, rods.chain, run.incline_deg):
-        own = f"alpha {protocol.condition(run).impact_chain}" if name == ALPHA else name
-        below, above = predicted_with(*low), predicted_with(*high)
-        for measurand in below.keys() & above.keys():
-            difference = above[measurand].value - below[measurand].value
-            slopes.setdefault(measurand, {})[own] = share * difference
-    return slopes
+    own = f"alpha {protocol.condition(run).impact_chain}"
+    slopes = predict_incline(protocol, run.incline_deg, run.impact).slopes
+    return {own if name == ALPHA else name: changes for name, changes in slopes.items()}
 
 
 def notes(protocol: Protocol) -> list[str]:
     """Its author's notes, and those on planned inclines, the same of several together."""
     return [*protocol.notes.splitlines(), *group_notes(predictions(protocol))]
-
-
-def group_notes(lines: Sequence[PredictedIncline]) -> list[str]:
-    """Write each note once, with the inclines that have it."""
-    labels: dict[str, list[str]] = {}
-    for line in lines:
-        for note in line.notes:
-            labels.setdefault(note, []).append(line.label)
-    return [f"{', '.join(inclines)}: {note}" for note, inclines in labels.items()]
-
-
-def _free_fall(protocol: Protocol) -> PredictedIncline:
-    """Predict the fall of a chain that strikes nothing."""
-    ((name, rods),) = protocol.chains.items()
-    length = protocol.drop.value + rods.chain.length
-    start, gravity = protocol.initial_speed.value, protocol.gravity.value
-    speed, time = air_legs(air_of(protocol, name))(length, start, gravity, 0)
-    scene = "free fall" if protocol.track is None else "track"
-    return PredictedIncline(
-        incline_deg=0.0,
-        model=f"{scene}{', drag' if protocol.drag is not None else ''}",
-        speed_m_s=speed,
-        fall_time_s=time,
-        free_fall_speed_m_s=speed,
-        in_domain=True,
-        notes=[],
-        struck=False,
-    )
 
 
 def air_of(protocol: Protocol, name: str) -> list[float]:

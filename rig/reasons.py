@@ -1,21 +1,77 @@
 """Why a drop is not simply accepted, or a request refused: codes with values.
 
-Whoever finds something returns ``Reason(code, values)``; the table in `rig.wordings` says how bad
-it is, what it is called, how it reads and what to do about it.
+Whoever finds something returns ``Reason(code, values)``; a row of ``wordings.txt`` says how bad it
+is, what it is called, how it reads and what to do about it. Sentences are written here, never read
+back.
 """
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
+from enum import IntEnum
 from pathlib import PurePath
-from string import Formatter
-from typing import Any
+from string import Formatter, Template
+from typing import Any, NamedTuple
 
+from rig import errors
 from rig.errors import RigError
+from rig.text_rows import read_paragraphs
 from rig.units import Quantity, format_quantity
 from rig.vocabulary import ANY_SCENE, VOCABULARIES, Vocabulary
-from rig.wordings import LOOK, NOTE, SENTENCE, WORDINGS, Severity
+
+OPERATOR, NOTE, SENTENCE = "operator", "note", "sentence"
+"""Codes of what is only text: a cause to reject a drop, a note to it, a sentence of an old file."""
+
+
+class Severity(IntEnum):
+    """What a reason does to a verdict."""
+
+    REMARK = 0
+    DOUBT = 1
+    VOID = 2
+
+
+class Wording(NamedTuple):
+    """What the program says of one code.
+
+    Attributes
+    ----------
+    severity
+        What it does to a verdict.
+    sentence
+        With places for values, see `rig.reasons`.
+    remedy
+        What to do about it; empty where nothing is to be done.
+    label
+        In a few words, where several drops have it; empty where the code says it.
+    error
+        What a request ends with that is refused for it.
+    """
+
+    severity: Severity
+    sentence: str
+    remedy: str
+    label: str
+    error: type[RigError]
+
+
+(_, *_TEXTS), *_PARAGRAPHS = read_paragraphs(__file__, "wordings.txt")
+_SHARED = dict(line.strip().split(": ", 1) for line in _TEXTS)
+"""What several sentences say, by name."""
+
+
+def _wording(head: str, *lines: str) -> tuple[str, Wording]:
+    """Read a paragraph of the table: a code, and what the program says of it."""
+    name, _, label = head.partition(": ")
+    kind, code = name.split()
+    error = vars(errors).get(kind)
+    severity = Severity[kind.upper()] if error is None else Severity.VOID
+    sentence, *remedy = (Template(line.strip()).safe_substitute(_SHARED) for line in lines)
+    return code, Wording(severity, sentence, "".join(remedy), label, error or RigError)
+
+
+WORDINGS = dict(_wording(*paragraph) for paragraph in _PARAGRAPHS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,19 +208,19 @@ def remedies(reasons: Iterable[Reason]) -> list[str]:
         for reason in reasons
     ]
     advice = [text for text in dict.fromkeys(advice) if text]
-    return [text for text in advice if text != LOOK] or advice
+    return [text for text in advice if text != _SHARED["look"]] or advice
 
 
 def summarize_reasons(reasons: Sequence[Reason]) -> str:
-    """Return the sentence of reasons of one kind; their label where they are not all the same."""
+    """Return the sentence of reasons of one kind; where they are not all the same, their label.
+
+    Behind the label stands what tells them from others of their code.
+    """
     first = reasons[0]
-    return first.text if all(reason == first for reason in reasons) else _label(first)
-
-
-def _label(reason: Reason) -> str:
-    """Return a reason's label, with what tells it from others of its code."""
-    words = ", ".join(value for value in reason.values.values() if isinstance(value, str))
-    label = WORDINGS[reason.code].label or reason.code.replace("_", " ")
+    if all(reason == first for reason in reasons):
+        return first.text
+    words = ", ".join(value for value in first.values.values() if isinstance(value, str))
+    label = WORDINGS[first.code].label or first.code.replace("_", " ")
     return f"{label} ({words})" if words else label
 
 

@@ -3,14 +3,10 @@
 These are the words in which link, session and analysis speak to each other.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
-if TYPE_CHECKING:
-    from rig.reasons import Reason
-
+from rig.reasons import Reason
 
 Direction: TypeAlias = Literal["tx", "rx"]
 """Of bytes on the line; ``tx``: host to device."""

@@ -1,13 +1,23 @@
-"""stdout and stderr: closed, full or read by nobody any more, they never change an exit code."""
+"""stdout and stderr: closed, full or read by nobody any more, they never change an exit code.
+
+What is said there names commands as this user can run them.
+"""
 
 import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from io import TextIOWrapper
+from shlex import quote
 from typing import TextIO
 
+from rig.command_page import COMMANDS
 from rig.printable import printable
+
+_NAMED = rf"(?<![\w/.-])rig (?=(?:{'|'.join(COMMANDS)}|--help)(?![\w:-]))"
+"""A command, but not the name that begins a program's own narration, as in ``rig daemon:``."""
 
 
 def open_streams() -> None:
@@ -30,7 +40,7 @@ def settle_streams() -> None:
 def say(line: str, end: str = "\n") -> None:
     """Tell the user something that is no result: a campaign goes on when nobody listens."""
     with tolerate_broken(sys.stderr):
-        print(printable(line), end=end, file=sys.stderr, flush=True)
+        print(printable(runnable(line)), end=end, file=sys.stderr, flush=True)
 
 
 def ask(question: str) -> str:
@@ -46,6 +56,27 @@ def ask(question: str) -> str:
     if not line:
         raise KeyboardInterrupt
     return line.strip()
+
+
+def runnable(text: str) -> str:
+    """Write each command of a text as this user can run it.
+
+    Before anybody activates the environment of `./run demo`, that is ``.venv/bin/rig check``.
+    """
+    return re.sub(_NAMED, lambda _: f"{_program()} ", text)
+
+
+@cache
+def _program() -> str:
+    from shutil import which  # noqa: PLC0415 - only for what names a command
+
+    installed = os.path.join(os.path.dirname(sys.executable), "rig")  # noqa: PTH118, PTH120
+    if which("rig"):
+        return "rig"
+    if which(installed) is None:
+        return f"{quote(sys.executable)} -m rig"
+    here = os.path.relpath(installed)
+    return quote(installed if here.startswith(os.pardir) else here)
 
 
 @contextmanager

@@ -116,7 +116,7 @@ def did_you_mean(word: str, accepted: Iterable[str], least: float = 0.6) -> str:
     return f"did you mean {folded[close[0]]}? " if close else ""
 
 
-def parse(text: str | float, dimension: Dimension) -> Quantity:
+def parse(text: str, dimension: Dimension) -> Quantity:
     """Read a quantity of a given dimension.
 
     Parameters
@@ -137,7 +137,6 @@ def parse(text: str | float, dimension: Dimension) -> Quantity:
     UnitError
         If the text is no such quantity; the message says what was found and what is accepted.
     """
-    text = str(text)
     accepted_form = f"accepted: {dimension.noun}, such as {dimension.example}"
     clean = " ".join(text.split()).replace("−", "-")
     if len(clean) > _LONGEST:

@@ -8,9 +8,8 @@ from pathlib import Path
 
 from rig.errors import RigError
 from rig.link.messages import DisarmReason, RefusalReason
-from rig.reasons import _PHRASES, make_reason, rig_error
+from rig.reasons import _PHRASES, WORDINGS, make_reason, rig_error
 from rig.vocabulary import Vocabulary
-from rig.wordings import WORDINGS
 
 RIG = Path(__file__).parents[1] / "rig"
 RAISERS = {"make_reason": 0, "rig_error": 0, "plain_reason": 1, "problem": 1,
@@ -24,7 +23,7 @@ DISARMED = {f"disarmed_{reason.name.lower()}" for reason in DisarmReason}
 
 @cache
 def trees():
-    paths = [path for path in RIG.rglob("*.py") if path.name not in {"wordings.py", "reasons.py"}]
+    paths = [path for path in RIG.rglob("*.py") if path.name != "reasons.py"]
     return [(path, ast.parse(path.read_text("utf-8"))) for path in paths]
 
 

@@ -104,7 +104,7 @@ def compare(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Comparis
     comparisons = []
     for name in (row.name for row in averaged()):
         lines = [
-            _Line(at, [run.quantities[name] for run in runs], model[name], slopes.get(name, {}))
+            _Line(at, [run.quantities[name] for run in runs], model[name], slopes)
             for (at, runs), (model, slopes) in zip(cases.items(), models, strict=True)
             if name in model and all(name in run.quantities for run in runs)
         ]
@@ -113,12 +113,12 @@ def compare(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Comparis
 
 
 class _Line(NamedTuple):
-    """Values under a condition, their prediction, and its derivatives by the coefficients."""
+    """Values under a condition, their prediction, and how coefficients move all predictions."""
 
     condition: Condition
     values: Sequence[Measured]
     predicted: Quantity
-    slopes: Mapping[str, float]
+    slopes: Mapping[str, Mapping[str, float]]
 
     @property
     def off(self) -> Array:
@@ -136,9 +136,9 @@ class _Line(NamedTuple):
 
 def _compare(name: str, lines: Sequence[_Line]) -> Comparison:
     names = {key: None for line in lines for key in line.slopes}
-    slopes = np.array([[line.slopes.get(key, 0.0) for key in names] for line in lines])
-    size = np.sum(slopes**2, axis=1) + [line.values[0].u ** 2 for line in lines]
-    covariance = _covariance(lines) + slopes @ slopes.T
+    moves = np.array([[line.slopes.get(key, {}).get(name, 0.0) for key in names] for line in lines])
+    size = np.sum(moves**2, axis=1) + [line.values[0].u ** 2 for line in lines]
+    covariance = _covariance(lines) + moves @ moves.T
     inexact = covariance.diagonal() > _ROUNDING * size
     covariance, lines = covariance[np.ix_(inexact, inexact)], [*compress(lines, inexact)]
     differences = tuple(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from rig.analysis.distributions import coverage_factor
 from rig.plain_data import Record, spread
-from rig.reasons import Reason, reasons_json, rig_error
+from rig.reasons import Reason, errors_become, reasons_json
 from rig.records import Job
 
 if TYPE_CHECKING:  # results are shown, and predictions made, where no drop is analysed
@@ -37,10 +37,8 @@ def optional_package(name: str) -> Any:
     InputError
         It is not installed.
     """
-    try:
+    with errors_become("package_absent", ModuleNotFoundError, package=name):
         return import_module(name)
-    except ModuleNotFoundError as error:
-        raise rig_error("package_absent", package=name) from error
 
 
 class Deviation(NamedTuple):

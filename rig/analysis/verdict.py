@@ -16,9 +16,8 @@ from rig.analysis.last_passages import APART, disagreements
 from rig.analysis.result import Audit, DropResult, Measured, Verdict
 from rig.measurands import RELEASE_SKEW
 from rig.protocol.protocol import Protocol, Run
-from rig.reasons import Reason, make_reason
+from rig.reasons import Reason, Severity, make_reason
 from rig.records import Drop
-from rig.wordings import Severity
 
 LATE = 0.2
 """Share of possibly late stamps, close after another stamp, above which a remark is made. Sixteen

@@ -1,7 +1,5 @@
 """``python -m rig.board ADDRESS DESCRIPTOR``, as a daemon starts it: the page's own process."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

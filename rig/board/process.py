@@ -14,7 +14,7 @@ import sys
 from contextlib import suppress
 from urllib.parse import urlsplit
 
-from rig.errors import InputError
+from rig.reasons import errors_become
 from rig.recorder.published import PublishedState
 
 log = logging.getLogger(__name__)
@@ -43,10 +43,8 @@ class BoardProcess:
 
     def __init__(self, host: str, port: int) -> None:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        try:
+        with errors_become("page_unserved", OSError, host=host, port=port):
             listener = socket.create_server((host, port), family=family)
-        except OSError as error:
-            raise InputError(f"--board {host}:{port}: {error}", "another HOST:PORT") from error
         with listener:
             self.address = _address(host, listener.getsockname()[1])
             descriptor = listener.fileno()

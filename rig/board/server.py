@@ -8,19 +8,10 @@ import socket
 from hashlib import sha256
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from typing import NamedTuple
 
 from rig.text_rows import read_rows
 
 _PATIENCE_S = 20.0
-
-
-class _Page(NamedTuple):
-    """A page as it is, compressed, and what tells it from others."""
-
-    plain: bytes = b""
-    packed: bytes = b""
-    tag: str = "none"
 
 
 class PageServer(ThreadingHTTPServer):
@@ -35,7 +26,8 @@ class PageServer(ThreadingHTTPServer):
     """
 
     daemon_threads = True
-    page = _Page()
+    page = "none", b"", b""
+    """What tells the page from others, the page as it is, and compressed."""
 
     def __init__(self, listener: socket.socket, script: str) -> None:
         super().__init__(listener.getsockname()[:2], _Answers, bind_and_activate=False)
@@ -47,7 +39,7 @@ class PageServer(ThreadingHTTPServer):
         """Have another page."""
         plain = page.encode("utf-8", "replace")
         tag = f'W/"{sha256(plain).hexdigest()[:20]}"'
-        self.page = _Page(plain, gzip.compress(plain, mtime=0), tag)
+        self.page = tag, plain, gzip.compress(plain, mtime=0)
 
     def handle_error(self, *_: object) -> None:
         """Leave out what a browser did that has gone."""
@@ -72,15 +64,15 @@ class _Answers(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """Send the page, or that it is the one that the browser has."""
-        page = self.server.page
+        tag, plain, packed = self.server.page
         if self.path.partition("?")[0] != "/":
             self.send_error(HTTPStatus.NOT_FOUND)
             return
-        is_kept = page.tag in self.headers.get("If-None-Match", "")
+        is_kept = tag in self.headers.get("If-None-Match", "")
         is_packed = "gzip" in self.headers.get("Accept-Encoding", "")
-        body = b"" if is_kept else page.packed if is_packed else page.plain
+        body = b"" if is_kept else packed if is_packed else plain
         self.send_response(HTTPStatus.NOT_MODIFIED if is_kept else HTTPStatus.OK)
-        self.send_header("ETag", page.tag)
+        self.send_header("ETag", tag)
         self.send_header("Content-Type", "text/html; charset=utf-8")
         self.send_header("Content-Length", str(len(body)))
         if is_packed:

@@ -44,9 +44,9 @@ def sign(files: Mapping[str, bytes], secret: SecretKey) -> dict[str, bytes]:
 
     The same files and key give the same bytes.
     """
-    signed = list_hashes({**files, PUBLIC_KEY: _text(secret.get_public_key())})
+    signed = list_hashes({**files, PUBLIC_KEY: bytes(secret.get_public_key()) + b"\n"})
     signature = secret.sign(signed[SUMS], untrusted_comment=_COMMENT, trusted_comment=_COMMENT)
-    return {**signed, SIGNATURE: _text(signature)}
+    return {**signed, SIGNATURE: bytes(signature) + b"\n"}
 
 
 def check_signature(files: Mapping[str, bytes], key: str | os.PathLike[str] | None) -> str:
@@ -76,7 +76,3 @@ def _read_key(path: str | os.PathLike[str], read: Callable[[bytes], Key]) -> Key
     """Read a key file; minisign's complaints about it become ours."""
     with errors_become("key_unusable", OSError, Error, path=path):
         return read(read_input(path, _LONGEST))
-
-
-def _text(part: object) -> bytes:
-    return bytes(part) + b"\n"  # type: ignore[call-overload, no-any-return]

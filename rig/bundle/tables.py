@@ -146,15 +146,12 @@ def _readme(session: Reader, tables: Mapping[str, str]) -> str:
     head = read_text(__file__, "readme.txt")
     lines += head.format(source=session.protocol_source, **session.meta).splitlines()
     for name, text in sorted(tables.items()):
-        columns = next(csv.reader(text.splitlines()))
-        lines += ["", name, *(f"  {column}{_describe(name, column)}" for column in columns)]
+        lines += ["", name]
+        for column in next(csv.reader(text.splitlines())):
+            unit, meaning = describe_column(name, column)
+            words = f"[{unit}] {meaning}".removeprefix("[] ").rstrip()
+            lines.append(f"  {column}: {words}" if words else f"  {column}")
     return "\n".join(lines) + "\n"
-
-
-def _describe(table: str, column: str) -> str:
-    unit, meaning = describe_column(table, column)
-    words = f"[{unit}] {meaning}".removeprefix("[] ").rstrip()
-    return words and f": {words}"
 
 
 def describe_column(table: str, column: str) -> tuple[str, str]:

@@ -12,9 +12,8 @@ from rig.campaign.voids import VoidRow, after, why_halted
 from rig.errors import RigError
 from rig.link.messages import RefusalReason
 from rig.link.refusals import DeviceRefusedError
-from rig.reasons import Reason, plain_reason
+from rig.reasons import NOTE, OPERATOR, Reason, plain_reason
 from rig.records import Job
-from rig.wordings import NOTE, OPERATOR
 
 
 class Stage(StrEnum):

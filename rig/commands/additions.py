@@ -4,10 +4,9 @@ from pathlib import Path
 
 from rig.commands.output import Arguments
 from rig.files import read_input
-from rig.reasons import errors_become, plain_reason, rig_error
+from rig.reasons import NOTE, errors_become, plain_reason, rig_error
 from rig.report.numbers import ranges
 from rig.session.store import Session
-from rig.wordings import NOTE
 
 LARGEST = 1 << 25
 """Bytes of a file; half of what a value of a session file may have."""

@@ -10,9 +10,7 @@ from shutil import get_terminal_size
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
-from rig.command_help import runnable
-from rig.streams import say as narrate
-from rig.streams import tolerate_broken
+from rig import streams
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -22,6 +20,7 @@ if TYPE_CHECKING:
     from rig.selftest.findings import Finding
 
 VOID = 3
+say = streams.say
 
 
 class Arguments(Namespace):
@@ -31,11 +30,6 @@ class Arguments(Namespace):
     further: Sequence[str]
     fresh: bool
     json: bool
-
-
-def say(line: str) -> None:
-    """Print a line of narration, with its commands as this user can run them."""
-    narrate(runnable(line))
 
 
 @contextmanager
@@ -80,7 +74,7 @@ def stage(label: str) -> None:
         Empty to clear the line.
     """
     if sys.stderr.isatty():
-        with tolerate_broken(sys.stderr):
+        with streams.tolerate_broken(sys.stderr):
             print(f"\r\x1b[K{label}", end="", file=sys.stderr, flush=True)
 
 
@@ -98,7 +92,7 @@ def print_findings(key: str, findings: Iterable[Finding], *, as_json: bool) -> i
     for finding in findings:
         checks.append(finding)
         if not as_json:
-            print(runnable(str(finding)), flush=True)
+            print(streams.runnable(str(finding)), flush=True)
     if as_json:
         print_json({key: [finding.json() for finding in checks]})
     return sum(finding.failed for finding in checks)

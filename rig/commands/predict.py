@@ -6,8 +6,8 @@ from pathlib import Path
 from rig.commands.output import Arguments, print_data, say
 from rig.files import write_atomic
 from rig.measurands import SEPARATION, SPEED
-from rig.model.prediction import PredictedIncline
-from rig.predictions import group_notes, predictions, quantities
+from rig.model.prediction import PredictedIncline, group_notes
+from rig.predictions import predictions
 from rig.protocol import reader
 from rig.protocol.protocol import Protocol
 from rig.report.columns import table_parts
@@ -30,7 +30,7 @@ def _write_table(protocol: Protocol, lines: list[PredictedIncline]) -> list[str]
     """Lay predictions out as text, notes below; without columns of what the scene does not have."""
     struck = protocol.surface is not None
     rows = (SEPARATION, SPEED) if protocol.two_chains else (SPEED,)
-    values = {"values": lambda line: quantities(line, *rows)}
+    values = {"values": lambda line: line.quantities(*rows)}
     (part,) = table_parts("predictions" if struck else "fall", lines, derived=values)
     part = replace(part, rows=[[cell or "–" for cell in row] for row in part.rows])
     notes = group_notes(lines)

@@ -1,5 +1,7 @@
 """A chain of rods: masses, heights and inertia for the mechanics."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate, pairwise
@@ -58,3 +60,11 @@ class Chain:
         above = [*accumulate(self.masses[:0:-1])][::-1]
         pairs = zip(pairwise(self.heights), above, self.masses, strict=False)
         return tuple((high - low, rest / mass) for (low, high), rest, mass in pairs)
+
+
+def equal_gaps(diameters: Sequence[float], length: float) -> tuple[float, ...]:
+    """Return the heights of rods with equal gaps between neighbours, bottom up, m."""
+    halves = [(lower + upper) / 2 for lower, upper in pairwise(diameters)]
+    gap = (length - math.fsum(halves)) / len(halves)
+    # The top is set, not summed, so that the length is exactly what was stated.
+    return (*accumulate((gap + half for half in halves[:-1]), initial=0.0), length)

@@ -7,7 +7,7 @@ from operator import mul
 
 import numpy as np
 
-from rig.model.chain import Chain
+from rig.model.chain import Chain, equal_gaps
 from rig.model.continuum import UniformChain, end, end_speed, separation_leading_order
 from rig.model.fall import Fall, Hit, fall, free_leg, hits, kicks
 from rig.model.impact import Impact, alpha_inclined, alpha_level, impact_on
@@ -37,10 +37,7 @@ TEXT_FOUNTAIN_ALPHAS = 0.10, 0.12
 
 def graded_chain() -> Chain:
     """Return the chain of Fig. 4: thinner rods towards the top, equal gaps, mass ∝ d²."""
-    halves = [(lower + upper) / 2 for lower, upper in pairwise(GRADED_DIAMETERS)]
-    gap = (LENGTH - sum(halves)) / len(halves)
-    heights = (*accumulate((gap + half for half in halves[:-1]), initial=0.0), LENGTH)
-    return Chain(tuple(d**2 for d in GRADED_DIAMETERS), heights)
+    return Chain(tuple(d**2 for d in GRADED_DIAMETERS), equal_gaps(GRADED_DIAMETERS, LENGTH))
 
 
 def graded_fall() -> tuple[list[Hit], list[float]]:
@@ -59,14 +56,13 @@ def _fall(chain: Chain, impact: Impact) -> Fall:
     return fall(chain, impact.alpha, impact.gamma, DROP, GRAVITY)
 
 
-def figure_3(step_deg: float = 1.0) -> Columns:
+def figure_3() -> Columns:
     """Return Δz and V against inclination, on the surface and, below 30°, on the pile.
 
     For the surface, inclines at which the rod would not slide are left out.
     """
     rows = []
-    inclines = [number * step_deg for number in range(round(90.0 / step_deg))]
-    for on_pile, incline in product((0.0, 1.0), inclines):
+    for on_pile, incline in product((0.0, 1.0), map(float, range(90))):
         # The pile rule excludes 30°; the curve is drawn up to it.
         surface, struck = (SURFACE, min(incline, 29.999)) if on_pile else (BARE, incline)
         impact = impact_on(surface, UNIFORM, struck)
@@ -98,10 +94,10 @@ def figure_4() -> Columns:
     return _columns(("time_s", "height_m", "speed2", "free_height_m", "free_speed2"), rows)
 
 
-def figure_6(points: int = 199) -> Columns:
+def figure_6() -> Columns:
     """Return Δz and V against rod inertia ξ at 40°: discrete model, Eq. 14 and Eq. 15."""
     names = ("inertia", "separation_m", "speed_m_s", "eq15_separation_m", "eq14_speed_m_s")
-    return _columns(names, [_inertia_row(n / (points + 1)) for n in range(1, points + 1)])
+    return _columns(names, [_inertia_row(n / 200) for n in range(1, 200)])
 
 
 def _inertia_row(inertia: float) -> Sequence[float]:

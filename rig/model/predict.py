@@ -9,7 +9,7 @@ from rig.errors import DomainError
 from rig.measurands import FALL_TIME, SEPARATION, SPEED
 from rig.model.chain import Chain
 from rig.model.fall import Fall, air_legs, fall, kicks
-from rig.model.impact import MU, impact_on, stated_coefficients, with_coefficients
+from rig.model.impact import ALPHA, MU, impact_on, stated_coefficients, with_coefficients
 from rig.model.prediction import PredictedIncline
 from rig.model.surface import Surface
 from rig.units import Quantity
@@ -65,7 +65,7 @@ def predict(
     except DomainError as error:
         return replace(result, notes=[error.message])
     release = {"drop": drop.value, "gravity": pull, "speed": start}
-    centre = {"alpha": impact.alpha, "drag": 1.0, **release}
+    centre = {ALPHA: impact.alpha, "drag": 1.0, **release}
 
     def fall_with(**moved: float) -> Fall:
         alpha, drag, *place = (centre | moved).values()
@@ -79,25 +79,31 @@ def predict(
     end, notes = fall_with(), [*impact.notes]
     values: dict[str, Any] = {row.name: getattr(end, name) for row, name in ENDS.items()}
     moves = {
-        "alpha": _moved_alphas(chain, surface, incline_deg),
         "drop": steps(drop, least=0.0),
         # g is not reduced below half: a fall without gravity has no end.
         "gravity": steps(gravity, least=pull / 2),
         "speed": steps(initial_speed, least=0.0),
         "drag": steps(Quantity(1.0, drag_u), least=0.0),
     }
+
+    def changes(moved: str, low: float, high: float, weight: float) -> dict[str, float]:
+        before, after = fall_with(**{moved: low}), fall_with(**{moved: high})
+        return {
+            row.name: (getattr(after, name) - getattr(before, name)) * weight
+            for row, name in ENDS.items()
+        }
+
+    slopes: dict[str, dict[str, float]] = {}
     try:
-        spread = [
-            (fall_with(**{name: low}), fall_with(**{name: high}), weight)
-            for name, ends in moves.items()
-            for low, high, weight in ends
-        ]
+        for name, *ends in _moved_alphas(chain, surface, incline_deg):
+            slopes[name] = changes(ALPHA, *ends)
+        of_release = [changes(name, *ends) for name, pairs in moves.items() for ends in pairs]
     except DomainError as error:
         notes.append(f"no uncertainty: within that of μ, {error.message}")
     else:
-        for row, name in ENDS.items():
-            slopes = ((getattr(b, name) - getattr(a, name)) * weight for a, b, weight in spread)
-            values[row.key("u")] = math.hypot(*slopes)
+        all_changes = [*slopes.values(), *of_release]
+        for row in ENDS:
+            values[row.key("u")] = math.hypot(*(change[row.name] for change in all_changes))
     if impact.basis == "pile":
         notes.append("rods gather on a pile: taken as level with the pile's restitution")
     basis = "" if impact.basis in {"surface", "level"} else f", {impact.basis}"
@@ -108,6 +114,7 @@ def predict(
         gamma=impact.gamma,
         in_domain=not impact.notes,
         notes=notes,
+        slopes=slopes,
         **values,
     )
 
@@ -131,27 +138,20 @@ def expected_alpha(chain: Chain, surface: Surface, incline_deg: float) -> Quanti
     """
     impact = impact_on(surface, chain, incline_deg)
     ends = _moved_alphas(chain, surface, incline_deg)
-    return Quantity(impact.alpha, math.hypot(*((b - a) * weight for a, b, weight in ends)))
+    return Quantity(impact.alpha, math.hypot(*((b - a) * weight for _, a, b, weight in ends)))
 
 
 def _moved_alphas(
     chain: Chain, surface: Surface, incline_deg: float
-) -> Iterator[tuple[float, float, float]]:
-    """Yield α with each coefficient changed down and up, and the weight."""
-    for _, low, high, weight in moved_coefficients(surface, chain, incline_deg):
-        yield impact_on(*low, incline_deg).alpha, impact_on(*high, incline_deg).alpha, weight
+) -> Iterator[tuple[str, float, float, float]]:
+    """Yield each input of α, α with it changed down and up, and the weight, unless exact.
 
-
-def moved_coefficients(
-    surface: Surface, chain: Chain, incline_deg: float
-) -> Iterator[tuple[str, tuple[Surface, Chain], tuple[Surface, Chain], float]]:
-    """Yield the name of each input of α, the scene with it changed down and up, and the weight.
-
-    The weight is u over the distance between both values; exact inputs are left out.
+    The weight is u over the distance between both values.
     """
     for name, stated in stated_coefficients(surface, chain, incline_deg).items():
         for *ends, weight in steps(stated, LEAST.get(name, -math.inf)):
-            low, high = (with_coefficients(surface, chain, {name: end}) for end in ends)
+            scenes = (with_coefficients(surface, chain, {name: end}) for end in ends)
+            low, high = (impact_on(*scene, incline_deg).alpha for scene in scenes)
             yield name, low, high, weight
 
 

@@ -1,7 +1,12 @@
 """The model's prediction for a scene, with or without a surface."""
 
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from typing import Any
+
+from rig.measurands import Measurand
+from rig.model.fall import air_legs
+from rig.units import Quantity
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -21,6 +26,8 @@ class PredictedIncline:
         Time until the top rod strikes, and its speed then without any impacts.
     in_domain, notes
         Whether the case is in the model's domain, and remarks.
+    slopes
+        By input of α, the change of each measurand with one standard uncertainty of it.
     struck
         Whether the scene has a surface; without a surface there are no uncertainties.
     """
@@ -40,6 +47,7 @@ class PredictedIncline:
     free_fall_speed_m_s: float
     in_domain: bool
     notes: list[str]
+    slopes: Mapping[str, Mapping[str, float]] = field(default_factory=dict, repr=False)
     struck: bool = True
 
     @property
@@ -48,9 +56,55 @@ class PredictedIncline:
         chain = f" {self.impact_chain}" if self.impact_chain else ""
         return f"{self.incline_deg:g}°{chain}{self.setting and f', {self.setting}'}"
 
+    def quantities(self, *rows: Measurand) -> dict[str, Quantity]:
+        """Return the predictions of some measurands by JSON name, without absent ones."""
+        return {
+            row.name: Quantity(value, getattr(self, row.key("u")) or 0.0)
+            for row in rows
+            if (value := getattr(self, row.name)) is not None
+        }
+
     def json(self) -> dict[str, Any]:
         """Return the object that ``rig predict --json`` prints, without absent quantities."""
-        absent = {"struck", "fall_time_u_s"}
+        absent = {"slopes", "struck", "fall_time_u_s"}
         absent |= set() if self.struck else {"separation_u_m", "speed_u_m_s"}
         absent |= {name for name in ("impact_chain", "setting") if not getattr(self, name)}
         return {name: value for name, value in asdict(self).items() if name not in absent}
+
+
+def predict_free_fall(
+    scene: str, length: float, gravity: float, initial_speed: float, kappas: Sequence[float]
+) -> PredictedIncline:
+    """Predict the fall of a chain that strikes nothing.
+
+    Parameters
+    ----------
+    scene
+        Name of the model without air.
+    length
+        Of the fall, m.
+    gravity, initial_speed
+        m/s² and m/s.
+    kappas
+        As in `rig.model.predict.predict`.
+    """
+    speed, time = air_legs(kappas)(length, initial_speed, gravity, 0)
+    return PredictedIncline(
+        incline_deg=0.0,
+        model=f"{scene}, drag" if kappas else scene,
+        speed_m_s=speed,
+        fall_time_s=time,
+        free_fall_speed_m_s=speed,
+        in_domain=True,
+        notes=[],
+        struck=False,
+    )
+
+
+def group_notes(lines: Iterable[PredictedIncline]) -> list[str]:
+    """Return each note once, with the inclines that have it."""
+    labels: dict[str, list[str]] = {}
+    for line in lines:
+        for note in line.notes:
+            labels.setdefault(note, []).append(line.label)
+    return [f"{', '.join(inclines)}: {note}" for note, inclines in labels.items()]

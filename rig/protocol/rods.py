@@ -1,8 +1,8 @@
 """The rods of a chain: diameters, masses and heights."""
 
-import math
 from itertools import accumulate, pairwise
 
+from rig.model.chain import equal_gaps
 from rig.protocol.fields import Section, UnsoundError
 from rig.protocol.keys import MOST_RODS
 from rig.units import Quantity, format_quantity
@@ -87,10 +87,7 @@ def place_rods(section: Section, diameters: RodValues) -> RodValues:
         return tuple(accumulate(spacing, initial=0.0))
     if spacing == "equal-pitch":
         return tuple(length * rod / last for rod in range(last + 1))
-    halves = [(lower + upper) / 2 for lower, upper in pairwise(diameters)]
-    gap = (length - math.fsum(halves)) / last
-    # The top is set, not summed, so that the length is exactly what the file says.
-    return (*accumulate((gap + half for half in halves[:-1]), initial=0.0), length)
+    return equal_gaps(diameters, length)
 
 
 def check_apart(section: Section, heights: RodValues, widths: RodValues, rise: float) -> None:

@@ -6,8 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from rig.errors import RigError, SessionError
-from rig.reasons import rig_error
-from rig.wordings import WORDINGS
+from rig.reasons import WORDINGS, rig_error
 
 UNREADABLE = (sqlite3.Error, UnicodeDecodeError)
 """Errors raised by SQLite; the second for a damaged name whose bytes are not text."""

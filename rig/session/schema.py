@@ -14,9 +14,8 @@ import msgspec
 
 from rig.boards import GATES
 from rig.printable import encodable
-from rig.reasons import Reason, plain_reason, read_record
+from rig.reasons import NOTE, SENTENCE, Reason, plain_reason, read_record
 from rig.text_rows import read_paragraphs
-from rig.wordings import NOTE, SENTENCE
 
 Row: TypeAlias = tuple[Any, ...]
 Record: TypeAlias = Mapping[str, Sequence[Sequence[object]]]

@@ -36,7 +36,7 @@ class ProblemList:
         self._count = 0
 
     def add(self, line: int, column: int, key: str, code: str, /, **values: object) -> None:
-        """Note a fault: its place, a code of `rig.wordings` and the values of its sentence."""
+        """Note a fault: its place, a code of `WORDINGS` and the values of its sentence."""
         self._count += 1
         if self._count <= MAX_PROBLEMS:
             reason = make_reason(code, **values)

@@ -10,12 +10,11 @@ from rig.campaign.plan import ATTEMPTS, CLOCK_S, describe_setup, job_to_judge, n
 from rig.campaign.voids import MANY, Void, after, in_common, voids_of, why_halted
 from rig.link.messages import RefusalReason
 from rig.protocol.protocol import Run
-from rig.reasons import make_reason, plain_reason
+from rig.reasons import NOTE, make_reason, plain_reason
 from rig.recorder.run_lines import RunLine
 from rig.records import Job
 from rig.session.reading import StateEntry
 from rig.session.schema import RunState
-from rig.wordings import NOTE
 from tests.tables import cases, read_table
 
 JOB = Job(1, 1)

@@ -11,7 +11,6 @@ from unittest.mock import Mock
 
 import pytest
 
-from rig.command_help import runnable
 from rig.doctor.board import BOARD_CHECKS, mains_ripple
 from rig.doctor.computer import PORT_CHECKS, check_packages, check_room
 from rig.doctor.session import check_restarts, check_session, describe_supply
@@ -23,6 +22,7 @@ from rig.selftest.board import BoardUnderTest, SelftestOptions
 from rig.selftest.findings import Verdict, make_check
 from rig.selftest.run import run_checks
 from rig.session.store import Session
+from rig.streams import runnable
 from tests.flash.pty_board import PtyBoard, silent_port
 from tests.refusals import refused
 from tests.selftest.benches import LoopedBoard, fire_drop, hold_drop, port_of, wired

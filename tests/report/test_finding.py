@@ -8,7 +8,7 @@ from rig.analysis.result import Measured
 from rig.protocol import reader
 from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Gate, Run
-from rig.reasons import make_reason, plain_reason, remedies
+from rig.reasons import OPERATOR, SENTENCE, WORDINGS, Severity, make_reason, plain_reason, remedies
 from rig.records import Drop, Edge
 from rig.report.finding import NONE, deviations, finding, headline, verdict
 from rig.report.templates import lines
@@ -16,7 +16,6 @@ from rig.report.timeline import lanes, timeline
 from rig.session.reading import StateEntry
 from rig.session.schema import RunState
 from rig.units import Quantity
-from rig.wordings import OPERATOR, SENTENCE, WORDINGS, Severity
 from tests.analysis.drops import made_up
 from tests.cli.lab import PROTOCOLS
 from tests.report import fake_analysis

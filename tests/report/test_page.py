@@ -11,12 +11,11 @@ import yaml
 
 from rig import __version__
 from rig.cli import main
-from rig.reasons import plain_reason
+from rig.reasons import OPERATOR, plain_reason
 from rig.report.attachments import METHOD, method_page
 from rig.report.templates import sentence
 from rig.session.schema import RunState
 from rig.session.store import Session
-from rig.wordings import OPERATOR
 from tests.cli.lab import ROOT, record, short_fence
 
 VOID_TAGS = {"meta", "br", "hr", "img", "link"}

@@ -6,7 +6,7 @@ import pytest
 
 from rig.campaign.machine import Stage
 from rig.cli import _parser
-from rig.reasons import plain_reason
+from rig.reasons import NOTE, plain_reason
 from rig.records import Job
 from rig.results.whole import notes
 from rig.session.schema import RunState
@@ -14,7 +14,6 @@ from rig.session.store import Session
 from rig.tui import client, commands
 from rig.tui.context import Options
 from rig.tui.survey import session_list
-from rig.wordings import NOTE
 from tests.cli.lab import short
 from tests.tui.lab import PATIENCE_S, at_screen, flat, listening, text_of
 
