@@ -22,7 +22,6 @@ def test_both_ways_agree():
         propagated = found[name]
         assert 0.78 < propagated.u / measured.u < 1.23, name
         assert abs(propagated.mean - measured.value) < 4 * measured.u / math.sqrt(TRIALS), name
-        assert propagated.low < measured.value < propagated.high
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.3])
