@@ -32,6 +32,6 @@ def _trials(protocol: Protocol) -> list[str]:
     """Say how many simulated drops the gates of a protocol identify, if it can be measured."""
     if protocol.thrown or not protocol.gates:
         return []
-    from rig.design.trials import trials, trials_text  # noqa: PLC0415 - numpy, only with gates
+    from rig.report.design import trials_line  # noqa: PLC0415 - numpy, only with gates
 
-    return [trials_text(trials(protocol), protocol.vocabulary)]
+    return [trials_line(protocol)]
