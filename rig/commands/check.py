@@ -23,8 +23,7 @@ def main(arguments: Arguments) -> None:
         from rig.report import canvas, mounting  # noqa: PLC0415 - matplotlib, only here
 
         check_gates(protocol)
-        figure = mounting.mounting_figure(protocol)
-        canvas.write_figure(arguments.output, figure)
+        canvas.write_figure(arguments.output, mounting.mounting_figure(protocol))
     print(describe(protocol, [*notes(protocol), *_trials(protocol)]))
 
 
