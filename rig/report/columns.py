@@ -27,9 +27,9 @@ class Part:
     """
 
     heading: str
-    sentences: Sequence[str] = ()
-    head: Sequence[tuple[str, bool]] = ()
-    rows: Sequence[Sequence[str]] = ()
+    sentences: Sequence[str]
+    head: Sequence[tuple[str, bool]]
+    rows: Sequence[Sequence[str]]
 
     @property
     def table(self) -> list[str]:
