@@ -160,9 +160,7 @@ def beam_fit(band: float) -> WorkProblem:
             lambda p: _passages(beams, p)[0] - times,
             begin,
             lambda p: _passages(beams, p)[1],
-            xtol=tolerance,
-            ftol=tolerance,
-            gtol=tolerance,
+            **dict.fromkeys(("xtol", "ftol", "gtol"), tolerance),
             x_scale="jac",
         )
         return answer(run.x, run.nfev)

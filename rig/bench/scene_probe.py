@@ -5,13 +5,9 @@ command does, notes what that has loaded and taken, and only then loads what cou
 are counted where Python is started with ``-X tracemalloc``, which makes it slower.
 """
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable
-
-TYPE_CHECKING = False
 
 COUNTED = {
     "impact.impact_on": "impact coefficients",

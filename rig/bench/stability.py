@@ -59,7 +59,7 @@ class StabilityRow(NamedTuple):
     note: str
 
 
-def stability(*, quick: bool = False) -> list[StabilityRow]:
+def stability(*, quick: bool) -> list[StabilityRow]:
     """Examine each quantity by itself, the problems of `rig.bench.problems`, and pairs.
 
     Parameters

@@ -68,7 +68,6 @@ def _sensitivity(session: Session, outcome: SessionResults, *, fresh: bool) -> l
 def _by_gates(outcome: SessionResults) -> Measured | None:
     """Acceleration that the gates found: of what only falls, or of the free chain."""
     for line in outcome.analysis.summary:
-        row = acceleration_in(line.means)
-        if row is not None:
+        if row := acceleration_in(line.means):
             return line.means[row.name]
     return None if outcome.gravity is None else outcome.gravity.measured

@@ -23,8 +23,7 @@ def main(arguments: Arguments) -> None:
         from rig.report import canvas, mounting  # noqa: PLC0415 - matplotlib, only here
 
         check_gates(protocol)
-        figure = mounting.mounting_figure(protocol)
-        canvas.write_figure(arguments.output, figure)
+        canvas.write_figure(arguments.output, mounting.mounting_figure(protocol))
     print(describe(protocol, [*notes(protocol), *_trials(protocol)]))
 
 
@@ -32,6 +31,6 @@ def _trials(protocol: Protocol) -> list[str]:
     """Say how many simulated drops the gates of a protocol identify, if it can be measured."""
     if protocol.thrown or not protocol.gates:
         return []
-    from rig.design.trials import trials, trials_text  # noqa: PLC0415 - numpy, only with gates
+    from rig.report.design import trials_line  # noqa: PLC0415 - numpy, only with gates
 
-    return [trials_text(trials(protocol), protocol.vocabulary)]
+    return [trials_line(protocol)]

@@ -9,14 +9,16 @@ from rig.design.cases import cases
 from rig.design.forecast import GateLayout, forecast
 from rig.design.rewriting import rewrite_heights
 from rig.design.search import better, room
-from rig.design.trials import readable, trials, trials_text
+from rig.design.trials import readable, trials
 from rig.files import write_atomic
+from rig.plain_data import attributes
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
 from rig.reasons import rig_error
 from rig.report.design import design_lines
+from rig.report.templates import sentence
 
 
 def main(arguments: Arguments) -> None:
@@ -61,13 +63,10 @@ def _read_scatter(path: str, protocol: Protocol) -> Components:
 def _forecast(protocol: Protocol, components: Components) -> dict[str, Any]:
     """Return what a layout measures, and how well, as JSON has it."""
     expected = forecast(protocol, GateLayout.of(cases(protocol, components)))
-    outcome = trials(protocol)
-    words = trials_text(outcome, protocol.vocabulary)
+    outcome, gates = trials(protocol), protocol.gates.gates
+    words = sentence("trials", outcome, protocol.vocabulary)
     return {
-        "gates": [
-            {"channel": gate.channel, "side": gate.side, "height_m": gate.height}
-            for gate in protocol.gates.gates
-        ],
+        "gates": [attributes(gate, "channel", "side", "height_m=height") for gate in gates],
         "readable": readable(protocol),
         "trials": {"drops": outcome.drops, "read": outcome.read, "text": words},
         "measurands": [

@@ -52,7 +52,6 @@ def _findings(url: str | None, session: str | None) -> Iterator[Finding]:
 def _board(url: str) -> Iterator[Finding]:
     try:
         with closing(open_port(url)) as port:
-            board = BoardUnderTest(port, SelftestOptions())
-            yield from run_checks(BOARD_CHECKS, board)
+            yield from run_checks(BOARD_CHECKS, BoardUnderTest(port, SelftestOptions()))
     except DeviceError as error:
         yield explain("board", error)

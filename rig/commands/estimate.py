@@ -5,7 +5,7 @@ from dataclasses import replace
 from rig.commands.output import Arguments, print_data, progress, say, tell_damage
 from rig.files import make_folder
 from rig.report.canvas import write_figure
-from rig.report.estimate import estimate_text
+from rig.report.estimate import estimate_lines
 from rig.report.estimate_figures import estimate_pictures
 from rig.results.estimated import session_estimate
 from rig.results.whole import check_open, results
@@ -18,17 +18,16 @@ def main(arguments: Arguments) -> int:
     with Session.open(arguments.session, readonly=True) as session:
         folder = None if arguments.output is None else make_folder(arguments.output)
         check_open(session)
-        fresh = arguments.fresh
-        outcome = results(session, progress, fresh=fresh)
-        estimate = session_estimate(session, outcome, progress, fresh=fresh)
+        outcome = results(session, progress, fresh=arguments.fresh)
+        estimate = session_estimate(session, outcome, progress, fresh=arguments.fresh)
     analysis, simulated = outcome.analysis, outcome.simulated
     likeness = None if analysis.rig is None else analysis.rig.likeness
     sections, data = Sections(), {"simulated": simulated, **estimate.json()}
-    text = estimate_text(estimate, sections, simulated=simulated)
+    lines = ["SIMULATED DATA"] * simulated + [*estimate_lines(estimate, sections)]
     if likeness is not None:
-        data |= {"likeness": likeness.json()}
-        text = text if likeness.like else f"{likeness.sentence}\n{text}"
-    print_data(data, text.split("\n"), as_json=arguments.json)
+        data["likeness"] = likeness.json()
+        lines[:0] = [likeness.sentence] * (not likeness.like)
+    print_data(data, lines, as_json=arguments.json)
     if folder is not None:
         for name, figure in estimate_pictures(estimate, sections).items():
             write_figure(folder / f"{name}.svg", replace(figure, simulated=simulated))

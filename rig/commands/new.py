@@ -23,8 +23,6 @@ from rig.runner import Operator, run_protocol
 from rig.streams import ask, say
 from rig.text_rows import read_rows, read_text
 
-_SIZES = ("gates", "rods", "length", "diameter", "drop", "repeats")
-"""Answers that a draft takes as they are."""
 _CHOICE = read_text(__file__, "choose.txt")
 """What somebody has, the ready protocol for it, and the command; README begins with it too."""
 
@@ -73,8 +71,8 @@ def _read_answers(arguments: Arguments, path: Path) -> tuple[str, Draft]:
     for option, limit in {"gates": GATES, "rods": 1000, "repeats": 1000}.items():
         answers[option] = _count(option, answers[option], limit)
     title = arguments.title or path.stem.replace("-", " ").replace("_", " ")
-    inclines, sizes = answers["incline"], {name: answers[name] for name in _SIZES}
-    return answers["board"], Draft(title=title, scene=scene, inclines=inclines, **sizes)
+    sizes = {name: answers[name] for name in Draft._fields if name in answers}
+    return answers["board"], Draft(title=title, scene=scene, inclines=answers["incline"], **sizes)
 
 
 def _can_ask(arguments: Arguments) -> bool:

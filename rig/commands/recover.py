@@ -14,8 +14,7 @@ def main(arguments: Arguments) -> int:
         if not damage.whole and not damage.foreign:
             say("rig recover SESSION -o NEW saves it")
         return 0 if damage.whole else SessionError.exit_code
-    missing = save(damage, arguments.output, arguments.protocol)
-    for record in missing:
+    for record in save(damage, arguments.output, arguments.protocol):
         say(f"not saved: {record}")
     say(f"{arguments.output}: {len(damage.drops)} drops; rig analyze computes their results")
     return 0

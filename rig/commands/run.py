@@ -13,8 +13,7 @@ _GO_ON = "  then press Enter (Ctrl-C stops; the same command continues) "
 
 def main(arguments: Arguments) -> int:
     """Carry out a protocol."""
-    attended = not arguments.yes and sys.stdin.isatty()
-    operator = Operator(say, _ask if attended else None)
+    operator = Operator(say, None if arguments.yes or not sys.stdin.isatty() else _ask)
     with goes_on("the same command continues the session"):
         places = arguments.protocol, arguments.port, arguments.session
         outcome = run_protocol(*places, operator, arguments.seed, arguments.socket)

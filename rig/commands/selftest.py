@@ -17,8 +17,7 @@ def main(arguments: Arguments) -> int:
     gates, url = arguments.gates, arguments.port
     if arguments.protocol is not None:
         url = add_settings(url, protocol=str(Path(arguments.protocol).resolve()))
-        protocol = reader.read(arguments.protocol)
-        gates = (gates or 0) | protocol.gates.mask
+        gates = (gates or 0) | reader.read(arguments.protocol).gates.mask
     release = arguments.release or arguments.judge is not None
     options = SelftestOptions(arguments.loopback, arguments.drops, release, gates)
     if options.release:

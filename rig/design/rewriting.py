@@ -32,8 +32,7 @@ def rewrite_heights(protocol: Protocol) -> str:
             changes.append((place.line - 1, place.column - 1, gate.height))
     for line, column, height in sorted(changes, reverse=True):  # from behind: places stay true
         text = lines[line]
-        value = _VALUE.match(text, column)
-        if value is not None:
+        if value := _VALUE.match(text, column):
             lines[line] = f"{text[:column]}{height * 1e3:.1f} mm{text[value.end() :]}"
     text = "".join(lines)
     written = parse(text, protocol.source).gates

@@ -115,8 +115,7 @@ def better(
             ]
             for stride, reach in ((_COARSE, len(places)), (1, _COARSE - 1)):
                 centre = places.index(layout[slot]) if layout[slot] in places else len(places) // 2
-                near = [n for n in places[::stride] if abs(places.index(n) - centre) <= reach]
-                for n in near:
+                for n in places[max(0, centre - reach) : centre + reach + 1 : stride]:
                     trial = score(protocol, fixed.plus(n))
                     if trial >= best - _WORTH:
                         continue

@@ -23,7 +23,6 @@ from rig.protocol.contact import of_run
 from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol, Run
 from rig.threads import one_thread
-from rig.vocabulary import Vocabulary
 
 DROPS = 20
 """Trials of a layout: one drop in twenty that fails shows in two lists of three."""
@@ -154,19 +153,3 @@ def margin(protocol: Protocol) -> float:
 def readable(protocol: Protocol) -> bool:
     """Whether every edge of a layout finds its rod, with something in hand."""
     return margin(protocol) >= MARGIN
-
-
-def trials_text(outcome: Trials, words: Vocabulary) -> str:
-    """Say how many simulated trial drops were identified, and which gate would help."""
-    share = "all" if outcome.read == outcome.drops else f"{outcome.read} of"
-    text = f"{share} {outcome.drops} simulated trial drops were identified"
-    if outcome.failing and words.two_sides:
-        sides = " and ".join(f"{side} side ({count})" for side, count in outcome.failing)
-        text += f"; unclear: {sides}"
-    if outcome.wanted is not None:
-        side, height = outcome.wanted
-        gate = f"{side} gate" if words.two_sides else "gate"
-        text += f"; add a {gate} at {height * 1e3:.0f} mm"
-    elif outcome.failing:
-        text += "; add a gate well above the lowest gate"
-    return text

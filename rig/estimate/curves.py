@@ -98,7 +98,11 @@ def drop_curves(
     if "free" in drop.model.records:
         free, moments = model_fall(protocol, run, "free"), np.minimum(times, struck.time[-1])
         by_model = free.heights(moments)[0] - struck.heights(moments)[0]
-        separation = with_band(_separations(adjusted, times), by_model)
+        free_top, struck_top = (
+            adjusted.top(role, adjusted.levels(role, adjusted.release(role) + times))
+            for role in ("free", "impact")
+        )
+        separation = with_band(free_top - struck_top, by_model)
     squares = with_band(_squares(adjusted, heights), struck.passages(heights)[1] ** 2)
     return DropCurves(run, heights, squares, times, separation)
 
@@ -114,14 +118,6 @@ def _squares(drop: AdjustedDrop, heights: Array) -> Dual:
     if (catching_up := drop.model.discrepancy.late_way) > 0.0:  # below the lowest beam
         speed += drop.late * np.clip(1.0 - heights / catching_up, 0.0, 1.0)
     return speed * speed
-
-
-def _separations(drop: AdjustedDrop, times: Array) -> Dual:
-    """How far the free chain's top rod is above the other's, each so long after its release."""
-    free, struck = (
-        drop.top(role, drop.levels(role, drop.release(role) + times)) for role in ("free", "impact")
-    )
-    return free - struck
 
 
 def model_fall(protocol: Protocol, run: Run, role: Side) -> Trajectory:

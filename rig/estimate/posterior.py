@@ -88,8 +88,7 @@ def posterior(protocol: Protocol, problem: CoefficientProblem, centre: Hypothesi
 
 def _nodes(measured: Measured, prior: tuple[float, float] | None) -> Array:
     """Return even nodes around what edges and prior say together; friction has no negative side."""
-    known = [(measured.value, measured.u), *([prior] if prior else ())]
-    values, us = np.transpose(known)
+    values, us = np.transpose([(measured.value, measured.u), *([prior] if prior else ())])
     mean, sd = float(us**-2 @ values / (us**-2).sum()), float((us**-2).sum()) ** -0.5
     low = max(0.0, mean - _REACH * sd)
     return np.linspace(low, max(mean, low) + _REACH * sd, NODES)

@@ -81,8 +81,7 @@ class Impulses(NamedTuple):
 
     def json(self) -> dict[str, Any]:
         """One of ``inclines``."""
-        names = "*condition", "rods", "resolved", "alpha", "*eq9", "groups=gains"
-        return attributes(self, *names)
+        return attributes(self, "*condition", "rods", "resolved", "alpha", "*eq9", "groups=gains")
 
 
 def impulses(protocol: Protocol, forms: Sequence[QuadraticForm]) -> tuple[Impulses, ...]:

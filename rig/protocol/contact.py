@@ -25,7 +25,7 @@ def touching_heights(chain: RodChain, incline_deg: float) -> tuple[float, ...]:
         Inclination of the board, below 90°.
     """
     sine, cosine = math.sin(math.radians(chain.tilt_deg)), math.cos(math.radians(incline_deg))
-    end = 0.5 * chain.rod_length * sine if sine else 0.0
+    end = 0.5 * chain.rod_length * sine
     across = math.sqrt(1.0 - (sine * cosine) ** 2) / cosine
     return tuple(end + 0.5 * diameter * across for diameter in chain.diameters)
 
@@ -110,5 +110,4 @@ def at_contact(protocol: Protocol, incline_deg: float, struck: str | None) -> Pr
     )
     drop = Quantity(protocol.drop.value - level.value, protocol.drop.u)
     contact = replace(protocol.contact, level=Quantity(0.0, level.u))
-    lowered = protocol.with_gates(lower)
-    return replace(lowered, drop=drop, contact=contact, stated=protocol)
+    return replace(protocol.with_gates(lower), drop=drop, contact=contact, stated=protocol)

@@ -81,7 +81,7 @@ class Either(NamedTuple):
 class ListOf(NamedTuple):
     """A list, whose items have keys of their own or are values."""
 
-    each: Accepted | None = None
+    each: Accepted | None
 
     def __str__(self) -> str:
         return "a list [ … , … ]" + (f" of values, {self.each}" if self.each else "")

@@ -8,6 +8,7 @@ from rig.bundle.archive import zip_files
 from rig.bundle.tables import csv_files
 from rig.ready import find_resource
 from rig.records import Drop
+from rig.report.templates import sentence
 from rig.results.whole import SessionResults
 from rig.session.reading import Reader
 
@@ -36,18 +37,13 @@ def attachments(
     tables = csv_files(session, outcome, () if few else _LARGE)
     tables |= {"protocol.yaml": session.protocol_text}
     contents = {name: text.encode("utf-8", "replace") for name, text in tables.items()}
-    words = (
-        "results, budgets and edges as CSV files, with the protocol"
-        if few
-        else "results as CSV files, with the protocol; rig export also writes budgets and edges"
-    )
+    own = (file for file in session.attached_files() if len(file.data) <= _DATA)
     rows = [
-        ("data.zip", "application/zip", zip_files(contents), words),
+        ("data.zip", "application/zip", zip_files(contents), sentence("tables", few)),
         ("summary.csv", "text/csv", contents["summary.csv"], "means only"),
         (METHOD, "text/markdown", method_page().encode(), "the whole method"),
+        *((f.name, "application/octet-stream", f.data, f"attached {f.added}") for f in own),
     ]
-    own = (file for file in session.attached_files() if len(file.data) <= _DATA)
-    rows += ((f.name, "application/octet-stream", f.data, f"attached {f.added}") for f in own)
     return [
         Attachment(name, kind, base64.b64encode(content).decode("ascii"), words)
         for name, kind, content, words in rows

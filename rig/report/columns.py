@@ -27,9 +27,9 @@ class Part:
     """
 
     heading: str
-    sentences: Sequence[str] = ()
-    head: Sequence[tuple[str, bool]] = ()
-    rows: Sequence[Sequence[str]] = ()
+    sentences: Sequence[str]
+    head: Sequence[tuple[str, bool]]
+    rows: Sequence[Sequence[str]]
 
     @property
     def table(self) -> list[str]:
@@ -64,7 +64,7 @@ def table_parts(
     row
         The measurand of all records; if not given, each record may have its own.
     """
-    records, table = list(records), _TABLES[name]
+    records, table = list(records), TABLES[name]
     written = partial(str.format, row=row, first=records[0] if records else None)
     columns = [
         (
@@ -84,14 +84,9 @@ def table_parts(
         yield Part(heading, sentences, [head for head, _ in columns], rows)
 
 
-def heading_of(name: str) -> str:
-    """Return the heading of a table."""
-    return _TABLES[name].heading
-
-
 def records_in(name: str, whole: Any) -> list[Any]:
     """Return a table's records by the path in its heading; for groups, each with each member."""
-    place, _, members = _TABLES[name].place.partition("*")
+    place, _, members = TABLES[name].place.partition("*")
     records = value_at(whole, place) or () if place else ()
     if members:
         return [(group, member) for group in records for member in getattr(group, members)]
@@ -156,7 +151,8 @@ def _verdict(error: float | None, *_: object) -> str:
     return "" if error is None else "agrees" if abs(error) <= 1.0 else "disagrees"
 
 
-_TABLES = dict(read_tables(__file__))
+TABLES = dict(read_tables(__file__))
+"""Tables of ``columns.txt`` by name."""
 _WORDS = ("words", "verdict", "quantity", "symbol")
 """Formats of columns without numbers."""
 _WAYS: dict[str, Callable[..., str]] = {

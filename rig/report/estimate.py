@@ -7,7 +7,7 @@ from typing import Any
 from rig.estimate.alphas import ConditionAlpha
 from rig.estimate.rods import Gain, resolution
 from rig.estimate.session import Coefficient, Coefficients, SessionEstimate, is_identified
-from rig.report.columns import Part, heading_of, records_in, table_parts
+from rig.report.columns import TABLES, Part, records_in, table_parts
 from rig.report.numbers import MINUS, decimals_for, fixed, plus_minus
 from rig.report.templates import lines
 from rig.sections import Sections
@@ -19,13 +19,11 @@ _PAGE = (*_TEXT, "inclines", "rods")
 """Tables of a page, with a record for each rod, or for rods identified only by their sum."""
 
 
-def estimate_text(found: SessionEstimate, sections: Sections, *, simulated: bool) -> str:
-    """Return all results for a terminal; failed sections are noted in `sections`."""
-    text = ["SIMULATED DATA"] if simulated else []
-    text.append(f"{found.drops} good drop{'s' * (found.drops > 1)}, {found.edges} edges")
+def estimate_lines(found: SessionEstimate, sections: Sections) -> Iterator[str]:
+    """Yield all results for a terminal; failed sections are noted in `sections`."""
+    yield f"{found.drops} good drop{'s' * (found.drops > 1)}, {found.edges} edges"
     for part in page_parts(found, sections, _TEXT):
-        text += part.lines
-    return "\n".join(text)
+        yield from part.lines
 
 
 def page_parts(
@@ -34,7 +32,7 @@ def page_parts(
     """Yield tables of ``columns.txt``; a failed table does not affect the others."""
     cells = _CELLS | {"contact": partial(_contact, found)}
     for name in names:
-        with sections.alone(f'The section "{heading_of(name)}"'):
+        with sections.alone(f'The section "{TABLES[name].heading}"'):
             words = lines("estimated", name, found, resolution, _correlation)
             yield from [*table_parts(name, records_in(name, found), words, cells)]
 

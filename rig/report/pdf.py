@@ -1,7 +1,5 @@
 """Conversion of a page to PDF by WeasyPrint (the extra ``pdf``), without a browser."""
 
-from __future__ import annotations
-
 import base64
 import re
 from contextlib import redirect_stdout

@@ -32,9 +32,8 @@ def check_drawable(layout: Layout) -> None:
         Inclines side by side, or more than two axes.
     """
     if layout.layered:
-        *first, last = (f"{value:g}" for value in layout.values["incline"])
-        inclines = ", ".join([*first, last])
-        raise rig_error("sweep_of_inclines", inclines=inclines, last=last)
+        inclines = [f"{value:g}" for value in layout.values["incline"]]
+        raise rig_error("sweep_of_inclines", inclines=", ".join(inclines), last=inclines[-1])
     if len(layout.axes) > 2:
         raise rig_error("sweep_of_axes", axes=len(layout.axes))
 

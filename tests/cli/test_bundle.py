@@ -120,9 +120,9 @@ def test_a_byte_altered_anywhere_is_found_and_named(bundle, tmp_path):
         )
         try:
             faults = read_bundle(altered)[1]
-        except InputError as error:  # its directory names no files any more
+        except InputError:  # its directory names no files any more
             assert at >= directory, at
-            faults = [str(error)]
+            continue
         # A file's size in the directory makes another file of it.
         assert faults, at
         # A directory that does not begin as one names no file.

@@ -11,13 +11,13 @@ from rig.analysis.components import Components, priors
 from rig.design.cases import BEAM, cases
 from rig.design.forecast import Forecast, GateLayout, forecast
 from rig.design.search import Room, better, score
-from rig.design.trials import Trials, readable, trials, trials_text
+from rig.design.trials import Trials, readable, trials
 from rig.estimate.coefficients import best, coefficient_problem
 from rig.estimate.hypotheses import model_alpha
 from rig.estimate.quadratic_forms import merge_like
 from rig.protocol import reader
 from rig.protocol.protocol import Condition, Gate, Gates, Plan, Priors, Protocol
-from rig.protocol.reader import parse
+from rig.report.templates import sentence
 from rig.vocabulary import OBJECT, TWO_CHAINS
 from tests.analysis.drops import PROTOCOLS, SINGLE, UNIFORM
 from tests.analysis.test_datum_board import from_board, raised
@@ -82,18 +82,18 @@ def test_low_beams_alone_are_read_too():
     """No beam sees the chain before it strikes: what rods pass is enough to tell the fall."""
     assert readable(LOW)
     # Counted from the board, rods touch higher where it is steep.
-    steep = parse(from_board(raised(UNIFORM.text, 25.0)).replace("10 deg, 40 deg, 50", "60"))
-    assert readable(steep)
+    steep = from_board(raised(UNIFORM.text, 25.0)).replace("10 deg, 40 deg, 50", "60")
+    assert readable(reader.parse(steep))
     assert trials(LOW, 6) == Trials(6, 6)
 
 
 def test_trials_that_fail_name_the_side_and_a_gate():
     found = Trials(20, 13, (("free", 7),), ("free", 0.3))
-    assert trials_text(found, TWO_CHAINS) == (
+    assert sentence("trials", found, TWO_CHAINS) == (
         "13 of 20 simulated trial drops were identified; unclear: free side (7); "
         "add a free gate at 300 mm"
     )
-    assert "side" not in trials_text(found, OBJECT)
+    assert "side" not in sentence("trials", found, OBJECT)
 
 
 def test_proposals_respect_limits_and_are_never_worse():
