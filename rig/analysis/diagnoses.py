@@ -15,7 +15,7 @@ from rig.analysis.chain_records import SIDES, ChainRecord
 from rig.analysis.distributions import most_by_chance
 from rig.analysis.equations import STRAY, standardise
 from rig.analysis.faults import Suspects, gate_values
-from rig.analysis.fit import DropFit, Fit, Matches, match
+from rig.analysis.fit import Fit, Matches
 from rig.arrays import Flags, Index
 from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, make_reason
@@ -160,18 +160,18 @@ def _values(protocol: Protocol, gate: int) -> dict[str, Any]:
 
 
 def gates_too_low(
-    protocol: Protocol, records: Iterable[ChainRecord], drop: DropFit | None
+    protocol: Protocol, records: Iterable[ChainRecord], matches: Matches | None
 ) -> tuple[int, ...]:
     """Return the lowest gates beside the striking chain that miss more rods than by chance.
 
-    There, rods strike before they pass, or lie in the beam; rods that pass late count as missed.
-    The highest gate is never left out. The rate of chance misses is that of all other gates.
+    There, rods strike before they pass, or lie in the beam. The highest gate is never left out. The
+    rate of chance misses is that of all other gates.
 
     Parameters
     ----------
     records
         The chains with their edges.
-    drop
+    matches
         `None` if the drop is not identified: then the number of edges is used.
 
     Returns
@@ -179,8 +179,7 @@ def gates_too_low(
     tuple of int
         Numbers of the gates in the protocol's list.
     """
-    in_time = None if drop is None else match(drop.model, drop.x)
-    counts = gate_counts(records, in_time)
+    counts = gate_counts(records, matches)
     due, hidden = sum(gate.due for gate in counts), sum(gate.hidden for gate in counts)
     struck, gates = [gate for gate in counts if gate.role == "impact"], protocol.gates.gates
     low: list[int] = []
