@@ -38,6 +38,8 @@ RELEASE, START, CLOCK, PULL, DRAG, ALPHA = range(len(NAMES))
 """Columns of these: release time, start height, clock rate, g, κ, α of all impacts."""
 PART = 6.0
 """Least spacing of two rods over σ of the first step: narrow enough to resolve neighbours."""
+_BROADER = 2.0
+"""Ratio of σ in the last step to its own value: allows for errors common to a beam or rod."""
 _STEPS = 12
 _FAR = 2.5
 """Radius of the grid of starts in prior standard uncertainties: 99 % of drops as stated."""
@@ -296,7 +298,7 @@ class SideFall:
         scales, levels = self.model.components, self.model.slopes[self.role].levels
         own = np.hypot(scales.floor, scales.departure * (self.record.ratios is not None))
         variance = own**2 + levels**2 @ self.model.unknowns.sd**2
-        return np.asarray(np.minimum(np.sqrt(variance), self.slack))
+        return np.asarray(np.minimum(_BROADER * np.sqrt(variance), self.slack))
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:

@@ -194,8 +194,9 @@ class Explainer:
         """Yield fits of the continuous faults with the largest gain by the score test."""
         sized, _ = self._faults
         gains = self._score_odds(fit, self.stated, sized)
-        # For a good reading the score test excludes faults without gain.
-        least = 0.0 if well_read(fit) else -math.inf
+        # For a good reading the score test excludes faults without gain. A fault may also remove
+        # the penalty for negative drag.
+        least = min(0.0, fit.held_back) if well_read(fit) else -math.inf
         likely: dict[object, Fault] = {}
         for n in np.argsort(-gains).tolist():
             if gains[n] > least:

@@ -89,7 +89,7 @@ class Fit(DropFit):
         uncertainties.
         """
         estimate, model = self.estimate, self.model
-        total = simultaneous(model, self.x)
+        total = simultaneous(model, self.x) + self.held_back
         for role, match in self.matches.items():
             rows = model.decorrelate(role, model.residuals(role, self.x, match), match)
             sigma = rows.sigma * estimate.scatter
@@ -98,6 +98,15 @@ class Fit(DropFit):
         y = model.unknowns.pull(self.x)
         total -= 0.5 * float(y @ y) + float(np.linalg.slogdet(estimate.root)[1])
         return total if math.isfinite(total) else -math.inf
+
+    @property
+    def held_back(self) -> float:
+        """Log of twice the posterior probability of κ > 0, as drag cannot be negative."""
+        at = self.model.unknowns["drag"].start
+        if not self.estimate.sd[at]:
+            return 0.0
+        below = -self.model.kappa(self.x) / float(self.estimate.own_u[at]) / math.sqrt(2.0)
+        return math.log(math.erfc(min(below, 26.0)))  # beyond which a double has no erfc
 
 
 def simultaneous(model: DropModel, x: Array) -> float:

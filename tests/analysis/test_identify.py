@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.special import log_ndtr
 
 from bench.studies.layout_catalogue import GateLayout, Kind, even
 from rig.analysis.annealing import MISSED, STRAYS
@@ -89,6 +90,10 @@ def log_likelihood(
     # A density of heights; of times it is speed times as much.
     density = -0.5 * volume - 0.5 * far @ np.linalg.solve(covariance, far)
     density += np.log(np.maximum(speed, 0.05)).sum()
+    # Air only holds back: what of the normal distribution of κ is below zero is not there.
+    known = np.linalg.solve(covariance, air)[:, 0]
+    kappa, spread = -known @ far, math.sqrt(1.0 - known @ air[:, 0])
+    density += math.log(2.0) + log_ndtr(kappa / spread)
     return float(density + times.size * (math.log((1.0 - MISSED) / MISSED) - math.log(STRAYS)))
 
 
