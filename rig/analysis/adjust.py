@@ -74,14 +74,7 @@ class Estimate:
 
 
 def adjust(
-    model: DropModel,
-    matches: Matches,
-    x: Array,
-    centre: Array | None = None,
-    done: float = DONE,
-    *,
-    scatter: float = 1.0,
-    rough: bool = False,
+    model: DropModel, matches: Matches, x: Array, centre: Array | None = None, done: float = DONE
 ) -> Estimate:
     """Fit all unknowns of a drop to its matched edges.
 
@@ -98,10 +91,6 @@ def adjust(
         Prior means of the unknowns, zero if not given.
     done
         Length of the last step, see `length`.
-    scatter
-        First guess of the scatter of the edges relative to that of the model.
-    rough
-        Whether the estimates suffice, and the scatter is not estimated on the way.
     """
 
     def about(at: Array, inflation: float) -> Linearization:
@@ -109,7 +98,7 @@ def adjust(
 
     at = model.unknowns
     centre = np.where(at.flat, math.nan, 0.0 if centre is None else centre)
-    return least_squares(about, at.sd, x, centre, done, scatter=scatter, rough=rough)
+    return least_squares(about, at.sd, x, centre, done)
 
 
 @np.errstate(all="ignore")  # a step to a NaN loss is rejected
@@ -121,8 +110,7 @@ def least_squares(
     done: float = DONE,
     steps: int = STEPS,
     *,
-    scatter: float = 1.0,
-    rough: bool = False,
+    as_stated: bool = False,
 ) -> Estimate:
     """Fit unknowns with normal priors to any observations.
 
@@ -137,10 +125,12 @@ def least_squares(
         Prior standard uncertainties of the unknowns; 0 holds an unknown fixed.
     centre
         Prior means, zero if not given; NaN for an unknown without a prior.
-    x, done, scatter, rough
+    x, done
         As in `adjust`.
     steps
         Greatest number of steps.
+    as_stated
+        Whether the observations scatter as assumed; otherwise their scatter is estimated.
 
     Returns
     -------
@@ -153,11 +143,11 @@ def least_squares(
         pull = np.where(np.isnan(prior), 0.0, y - prior)
         return _Point(y, inflation, linearize(y * sd, inflation), sd, pull)
 
-    point = look(standardise(x, sd), scatter)
+    point = look(standardise(x, sd), 1.0)
     if not math.isfinite(point.loss):
         return Estimate(x, sd, np.eye(x.size), math.inf, 0, 1.0, settled=False)
     damping, previous, step = 0.0, 0.0, np.zeros_like(x)
-    inflation, settled, shorts = scatter, False, 0
+    inflation, settled, shorts = 1.0, False, 0
     for _ in range(steps):
         step = point.root.damp(damping).step() if damping else point.root.step()
         moved = length(step, point.root.matrix)
@@ -166,10 +156,10 @@ def least_squares(
         shorts = shorts + 1 if moved < done else 0
         last = point.size < done or shorts > PATIENT
         short = near and (last or (not damping and moved**2 < done * previous))
-        if short or (near and not rough):
+        if short or (near and not as_stated):
             factor = point.excess()
             inflation = point.inflation * factor
-            settled = short and (rough or factor == 1.0)
+            settled = short and (as_stated or factor == 1.0)
             if settled:
                 break
             if factor != 1.0:

@@ -46,11 +46,10 @@ _FAR = 2.5
 _NODES = 400
 PEAKS = 5
 """Starts of a batch that are annealed, and grid points of the first batch."""
-_ALIKE = 0.75
-"""Share of equally assigned edges above which two starts converge to the same fall."""
 LEAST = 0.6
 """Least share of the expected edges that a fall must explain. Also the least share of the best
-start's votes with which another start is tried."""
+start's votes with which another start is tried, and the largest share of edges that it may assign
+like that."""
 
 
 def matched(match: Index) -> tuple[Index, Index]:
@@ -522,7 +521,7 @@ class SideFall:
         rods = np.where(weight > 0.5, side, -1).max(axis=2)
         for n, sides in enumerate(rods):
             alike = ((rods[chosen] == sides) & (sides >= 0)).sum(axis=1)
-            if len(chosen) < PEAKS and (alike <= _ALIKE * (sides >= 0).sum()).all():
+            if len(chosen) < PEAKS and (alike <= LEAST * (sides >= 0).sum()).all():
                 chosen.append(n)
         return chosen
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.analysis.adjust import DONE, Estimate, adjust
+from rig.analysis.adjust import Estimate, adjust
 from rig.analysis.annealing import PART, count_matched, log_density, matched
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY
@@ -25,7 +25,6 @@ class Begun(NamedTuple):
 
 
 _FINE = 0.8e-3  # m, standard deviation of an edge about a fitted trajectory, for matching
-_NEAR = 10.0  # standard uncertainties: step length after which edges are matched again
 _ROUNDS = 6
 _MEDIAN = 0.6745
 """Median of the absolute values of a standard normal distribution."""
@@ -125,13 +124,12 @@ def settle(model: DropModel, x: Array, matches: Matches | None = None) -> Fit:
     matches
         Matches to begin with; those at `x` if not given.
     """
-    matches, scatter = match(model, x) if matches is None else matches, 1.0
-    for done in (_NEAR, *[DONE] * _ROUNDS):
-        rough, used = done == _NEAR, matches  # this fit need not converge, as matches will change
-        estimate = adjust(model, matches, x, done=done, scatter=scatter, rough=rough)
-        x, scatter = estimate.x, 1.0 if rough else estimate.scatter
+    matches = match(model, x) if matches is None else matches
+    for _ in range(_ROUNDS):
+        used, estimate = matches, adjust(model, matches, x)
+        x = estimate.x
         matches = without_strays(model, x, match(model, x))
-        if not rough and all(np.array_equal(used[role], matches[role]) for role in used):
+        if all(np.array_equal(used[role], matches[role]) for role in used):
             break
     return Fit(model, used, x, estimate)
 

@@ -44,7 +44,6 @@ _FIRST = 2  # rounds until shared and own unknowns fit together, and until both 
 _DONE = 0.02
 """Last step in standard uncertainties, root mean square over independent sums of shared unknowns,
 and last relative change of the components."""
-_SHORTEST = 1e-6  # least share of a step before the fit fails
 _FASTER, _SLOWER = 1.2, 0.5
 """Factors on the pace of a component from round to round, as usual for Rprop (Riedmiller 1994): it
 would creep, or alternate."""
@@ -185,7 +184,7 @@ def joint_fit(fits: Sequence[DropFit]) -> JointFit:
         sd, root, groups = joint_step(groups, x, STRAY if round_ else math.inf)
         step = pace[:size] * root.step()
         # Once shared unknowns rest, halve steps: a drop's own may alternate about an impact.
-        share = max(2.0 * _SHORTEST, 0.5 ** max(0, rests - _FIRST))
+        share = 0.5 ** max(0, rests - _FIRST)
         moves = _move(groups, x, sd, step, share) if np.isfinite(step).all() else None
         if moves is None:
             settled, groups = False, []
@@ -229,7 +228,7 @@ def _move(
         The shared unknowns, the drops, and the residuals of all edges; `None` if no part of the
         step gives finite residuals.
     """
-    while share > _SHORTEST:
+    for _ in range(STEPS):
         common = x + share * step * sd
         moved = [group.move(common, step, share) for group in groups]
         remaining = [

@@ -15,7 +15,7 @@ from rig.units import Quantity
 KNOWN = 0.2
 """A coefficient less sure than this is not identified: all of them are within about one."""
 FOUND = 0.5
-"""Share of its prior uncertainty that a nuisance must lose to the edges to count as found."""
+"""Standard uncertainty of a found nuisance, at most, in units of the prior's or of its value."""
 
 
 class CoefficientProblem(NamedTuple):

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from rig.analysis.distributions import chi2_tail
 from rig.analysis.result import Measured
-from rig.estimate.coefficients import CoefficientProblem
+from rig.estimate.coefficients import FOUND, CoefficientProblem
 from rig.estimate.hypotheses import END, one_alpha, with_end_correction, with_nuisances
 from rig.estimate.hypothesis_fit import fit
 from rig.model.impact import impact_on
@@ -14,7 +14,6 @@ from rig.reasons import make_reason
 
 STRONG = 10.0
 """ΔAIC from which the worse model has essentially no support (Burnham and Anderson 2002)."""
-_TELLS = 0.5  # standard uncertainty of γ over Eq. 10's, above which the edges do not tell it
 
 
 class EndCorrection(NamedTuple):
@@ -49,7 +48,7 @@ class EndCorrection(NamedTuple):
     @property
     def is_needed(self) -> bool | None:
         """Whether edges want it; `None` where they do not tell."""
-        return self.worse > 0.0 if self.scale.u <= _TELLS else None
+        return self.worse > 0.0 if self.scale.u <= FOUND else None
 
     @property
     def sentence(self) -> str:

@@ -169,7 +169,7 @@ def fit(forms: Sequence[QuadraticForm], hypothesis: Hypothesis) -> HypothesisFit
         chi2 = sum(float(rows.left @ rows.left) for rows in blocks.values())
         return Linearization(blocks, chi2, sum(form.edges for form in forms), chi2)
 
-    solution = least_squares(linearize, sd, begin, done=_DONE, rough=True)
+    solution = least_squares(linearize, sd, begin, done=_DONE, as_stated=True)
     if not solution.settled:
         raise RigError("the fit does not settle", "rig analyze shows whether the drops are sound")
     chi2 = sum(float(rows.left @ rows.left) for rows in solution.rows.values())
