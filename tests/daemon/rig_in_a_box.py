@@ -295,13 +295,13 @@ class Box:
     def check(self):
         """See that no drop is lost, whatever has happened, and that the log is what is shown."""
         worker = self.worker
-        if worker is not None and worker.controller.opened and worker._trouble is None:
+        if worker and worker.controller.opened and not worker._trouble:
             shown = worker.published.snapshot()["state"]
             line, drop = shown["runs"][0], shown["drop"]
             state = (self.on_disk("state", (1, line["attempt"])) or ["planned"])[-1]
             assert line["state"] == state, f"{line['state']} is shown, {state} is logged"
-            if drop is not None and state in {"interrupted", "recorded"}:
-                assert drop["state"] == state, f"{drop['state']} is shown of a drop {state}"
+            if drop and state in {"interrupted", "recorded"}:
+                assert drop["state"] == state, "the drop is shown as another"
         held = self.board._controller
         label = held.drop.order.label if held.drop is not None else None
         for job in self.fell:

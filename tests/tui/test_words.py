@@ -73,6 +73,7 @@ def test_enter_is_not_offered_before_the_verdict_is_kept():
     assert "Enter after the verdict is saved" in keys_of(replace(shown, flow=waits))
     assert step(kept, GoOn(job, 0.0))[0].job == job
     assert "Enter end" in keys_of(replace(shown, flow=kept))
+    assert "Enter next run" in keys_of(replace(shown, flow=kept, state=DaemonState()))
 
 
 def keys_of(shown, width=80):
