@@ -325,7 +325,7 @@ def step(flow: Flow, event: Event) -> Outcome:  # noqa: PLR0912 - one line an ev
             return flow.to(Stage.TESTING)._replace(home=flow.stage), (Drive(),)
         case SessionOpen() if flow.stage is Stage.PROTOCOL:
             return flow.to(Stage.DEVICE), ()
-        case SessionClose() if flow.stage in {*_IDLE, *_VERDICT}:
+        case SessionClose() if flow.stage is not Stage.PROTOCOL:
             return flow.to(Stage.PROTOCOL)._replace(job=None, row=()), ()
         case Found(job) if flow.stage in {*_IDLE, Stage.HALTED}:
             return flow._replace(job=job).to(Stage.JUDGING), (Judge(job),)

@@ -34,9 +34,7 @@ def main(arguments: Arguments) -> int:
         members: dict[str, Any] = {}
         if arguments.priors:
             members["prior_sensitivity"] = _sensitivity(session, outcome, fresh=arguments.fresh)
-    video = None
-    if track and not outcome.blind:
-        video = video_fall(*track[:3], _by_gates(outcome))
+    video = video_fall(*track[:3], _by_gates(outcome)) if track and not outcome.blind else None
     if video is not None:
         members["video"] = video.json()
     code = print_results(outcome, as_json=arguments.json, **members)

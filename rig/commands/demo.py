@@ -34,8 +34,10 @@ def main(arguments: Arguments) -> int:
     write_atomic(protocol, text)
     drops = len(runs(parse(text)))
     say(f"{drops} drops of two chains, {arguments.repeats} at each incline")
-    options = f"--repeats {arguments.repeats} --seed {arguments.seed}"
-    with goes_on(f"rig demo -o {quote(str(folder))} {options} continues it"):
+    with goes_on(
+        f"rig demo -o {quote(str(folder))} --repeats {arguments.repeats} "
+        f"--seed {arguments.seed} continues it"
+    ):
         places = str(protocol), "sim://", str(session)
         analysis = run_protocol(*places, Operator(say), arguments.seed).analysis
         print("\n".join(["SIMULATED DATA", *beside_truth(analysis, session)]))

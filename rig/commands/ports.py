@@ -20,8 +20,12 @@ def main(arguments: Arguments) -> None:
     chosen = arguments.identify
     if chosen == []:
         chosen = [port.path for port in ports if port.candidate]
-    why, listed = "not a serial port of this computer", {port.path for port in ports}
-    ports += [SerialPort(path, skipped=why) for path in chosen or () if path not in listed]
+    listed = {port.path for port in ports}
+    ports += [
+        SerialPort(path, skipped="not a serial port of this computer")
+        for path in chosen or ()
+        if path not in listed
+    ]
     records = [_describe(port, ask=port.path in (chosen or ())) for port in ports]
     lines = (sentence("port", record) for record in records)
     print_data({"ports": records}, lines, as_json=arguments.json)

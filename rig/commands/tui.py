@@ -3,11 +3,13 @@
 import asyncio
 import gc
 import os
+import signal
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
 
 from rig.commands.output import Arguments
+from rig.ctrl_c import signals_go_to
 from rig.daemon.socket_path import require_sockets
 from rig.ports import check_name
 from rig.reasons import rig_error
@@ -27,22 +29,23 @@ def main(arguments: Arguments) -> None:
 
 
 async def _show(app: RigApp) -> None:
-    """Show it until it ends. For Textual a signal is an end like any other, for a shell it is not.
+    """Show it until it ends; a signal ends it as its user does, with the terminal restored.
 
     Raises
     ------
-    asyncio.CancelledError
-        Of which `asyncio.run` makes a `KeyboardInterrupt`.
+    KeyboardInterrupt
+        It was a signal.
     Exception
         Any that nobody foresaw: Textual would only print it.
     """
     app.error_console.quiet = True
-    await app.run_async()
+    soon = asyncio.get_running_loop().call_soon_threadsafe
+    with signals_go_to(lambda *_: soon(app.exit, None, 1), signal.SIGINT, signal.SIGTERM):
+        await app.run_async()
     if app._exception is not None:
         raise app._exception
-    task = asyncio.current_task()
-    if task is not None and task.cancelling():
-        raise asyncio.CancelledError
+    if app.return_code:
+        raise KeyboardInterrupt
 
 
 def _options(arguments: Arguments) -> Options:

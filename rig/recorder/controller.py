@@ -133,8 +133,7 @@ class Controller:
         log.info("session: %s", path)
         self.published.plan(plan)
         self.published.set(session=about, drop=None, release_test=None)
-        if about["blind"]:
-            self.published.replace_edges(())  # of a drop that was fetched
+        self.published.replace_edges(())  # of a drop that was fetched
         return fetched
 
     def unblind(self) -> None:
@@ -225,11 +224,12 @@ class Controller:
             recorder.collect(held, fresh=False)
             self._lost.pop(held, None)
         latest = {entry.run: entry for entry in self.session.states()}
-        for run, attempt, state, *_ in latest.values():
-            is_begun = state in {RunState.ARMED, RunState.FIRED}
-            if is_begun and self.session.drop(run, attempt) is None:
-                why = (make_reason("connection_ended"),)
-                recorder.state(Job(run, attempt), RunState.INTERRUPTED, why)
+        for run, attempt, state, _, reasons in latest.values():
+            job = Job(run, attempt)
+            if state in {RunState.ARMED, RunState.FIRED} and self.session.drop(*job) is None:
+                recorder.state(job, RunState.INTERRUPTED, (make_reason("connection_ended"),))
+            else:  # a disk that was full may have taken it since
+                recorder.feed.state(job, state, reasons)
         return held
 
     # ------------------------------------------------------------------ drops

@@ -74,6 +74,8 @@ class Recorder:
 
     Attributes
     ----------
+    feed
+        What clients see of it.
     identity
         Who is there.
     armed
@@ -95,7 +97,7 @@ class Recorder:
         port: Port | None = None,
     ) -> None:
         self.session = session
-        self._feed = StateFeed(published)
+        self.feed = StateFeed(published)
         self._halted = halted
         self._uneven = random.Random(0)
         self.armed: Job | None = None
@@ -254,9 +256,9 @@ class Recorder:
             self.session.add_drop(drop, host_ns=self.clock.now_ns(), provenance="device")
             self.state(job, RunState.RECORDED, drop.faults)
             log.info("%s: recorded, %d edges", job, len(drop.edges))
-            self._feed.show_drop(drop)
         elif (stored.certificate, stored.fire_tick) != (drop.certificate, drop.fire_tick):
             raise rig_error("drop_differs", **job._asdict())
+        self.feed.show_drop(drop)
         if drop.certificate is not None:
             self.device.acknowledge(label, drop.certificate.crc32)
             self.session.commit()
@@ -277,7 +279,7 @@ class Recorder:
         self.session.commit()
         if state is RunState.INTERRUPTED:
             log.info("%s: interrupted: %s", job, sentences(reasons))
-        self._feed.state(job, state, reasons)
+        self.feed.state(job, state, reasons)
 
     def go_on(self) -> None:
         """Go on unless everything shall be off.
@@ -314,4 +316,4 @@ class Recorder:
     def _note(self, record: Record) -> None:
         if isinstance(record, ClockSample | Pulse):
             self.session.add_timing(record)
-        self._feed.know(record)
+        self.feed.know(record)

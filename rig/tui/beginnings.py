@@ -41,11 +41,12 @@ class Beginning(NamedTuple):
 def first_row(rows: list[Beginning], options: Options) -> int:
     """Return the row to select first: a blocking daemon, unfinished session, file or trial."""
     sections = "Continue" * (not options.port), HERE, "Ready experiments"
+    named = {file.resolve() for file in options.files}
     places = [(False, -1, at) for at, row in enumerate(rows) if row.kind == "end"]
     places += [
         (bool(read_file(row.file)[1]), sections.index(row.section), at)
         for at, row in enumerate(rows)
-        if row.section in sections and row.file and (row.session or row.file in options.files)
+        if row.section in sections and row.file and (row.session or row.file.resolve() in named)
     ]
     return min(places, default=(False, 0, 0))[2]
 

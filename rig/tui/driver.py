@@ -6,7 +6,7 @@ from time import monotonic
 from typing import Any
 
 from rig.campaign import machine as campaign
-from rig.campaign.machine import Effect, Event, Stage, effect_failure, step
+from rig.campaign.machine import Effect, Event, effect_failure, step
 from rig.errors import DeviceTimeoutError, RigError
 from rig.tui.follow import Follower
 from rig.tui.model import Model, StopAnswer
@@ -39,21 +39,23 @@ class Driver:
     def take(self, event: Event) -> None:
         """Handle an event, and carry out its effects."""
         model = self.model
-        flow, effects = step(model.flow, event)
-        model.flow = flow
-        if flow.stage is Stage.RESULT and flow.job is not None:
-            self.follower.judged.add(flow.job)
+        model.flow, effects = step(model.flow, event)
         for effect in effects:
             if isinstance(effect, campaign.Stop) and model.client.idle:
                 continue  # without a rig, no chain can fall
             if isinstance(effect, campaign.Stop):
                 model.stop = StopAnswer(monotonic())
-            self.begin(self._carry_out(effect, flow.ticket))
+            self.begin(self._carry_out(effect, model.flow.ticket))
 
     async def open_session(self, protocol: str, session: str, seed: int | None) -> None:
         """Open a session in the daemon, now and after each restart."""
         names = {"protocol": protocol, "session": session, "seed": seed}
-        await self.model.client.connection.call("open_session", **names)
+        try:
+            await self.model.client.connection.call("open_session", **names)
+        except RigError:
+            self.asked = None
+            self.take(campaign.SessionClose())
+            raise
         self.asked = protocol, session
 
     async def close_session(self) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Coroutine, Iterator, Mapping
+from collections.abc import Callable, Coroutine, Iterator
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any
@@ -45,15 +45,9 @@ class Follower:
         Where the state is written.
     begin
         Runs a coroutine in the background.
-
-    Attributes
-    ----------
-    judged
-        Drops with a verdict from this screen.
     """
 
     def __init__(self, model: Model, begin: Callable[[Coroutine[Any, Any, None]], object]) -> None:
-        self.judged: set[Job] = set()
         self._model = model
         self._begin = begin
         self._path: Path | None = None
@@ -77,6 +71,7 @@ class Follower:
     def _forget(self, path: Path | None = None) -> None:
         self._path, model = path, self._model
         model.live, model.view, model.voids, model.indicators = None, None, Voids(), Indicators()
+        model.unreadable = ""
 
     def absorb(self, *, reopens: bool) -> Iterator[Event]:
         """Take over the daemon's present state, and yield events for its changes.
@@ -84,9 +79,9 @@ class Follower:
         Parameters
         ----------
         reopens
-            Whether a closed session will be opened again from here.
+            Whether a closed session will be opened again from here, once this client has control.
         """
-        client, before, stage = self._model.client, self._model.state, self._model.flow.stage
+        client, stage = self._model.client, self._model.flow.stage
         state = self._model.state = client.state
         self._look_at_gates(state)
         if not client.up:
@@ -94,17 +89,16 @@ class Follower:
             return
         yield from _back(client, state)
         yield from _broken(stage, state)
-        session = state.section("session")
-        if session:
-            self._look_at_session(session, state)
+        if state.section("session"):
+            self._look_at_session(state)
             yield campaign.SessionOpen()
-        elif before.section("session") and not reopens:
+        elif not (reopens and client.driving):
             self._forget()
             yield campaign.SessionClose()
         if not client.driving and stage not in {Stage.LIVE, Stage.JUDGING}:
             yield campaign.Lost(_TAKEN)
         missed = job_to_judge(state.runs)
-        if missed and missed not in self.judged and client.driving:
+        if missed and client.driving:
             yield campaign.Found(missed)
 
     def _look_at_gates(self, state: DaemonState) -> None:
@@ -122,7 +116,8 @@ class Follower:
             model.indicators = model.indicators.seen(state.blocked_mask, now)
         self._counted = job, len(state.edges)
 
-    def _look_at_session(self, session: Mapping[str, object], state: DaemonState) -> None:
+    def _look_at_session(self, state: DaemonState) -> None:
+        session = state.section("session")
         path = Path(str(session["path"]))
         if self._path != path:
             self._forget(path)

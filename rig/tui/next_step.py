@@ -59,7 +59,10 @@ def _situation(model: Model) -> str:
         (model.client.up and not model.client.driving, "watching"),
         # What comes next depends on the verdict.
         (stage is Stage.RESULT and not model.flow.logged, "unsaved"),
-        (stage in {Stage.RESULT, Stage.DONE} and model.next_job is None, f"{stage} last"),
+        (
+            stage in {Stage.RESULT, Stage.DONE} and model.runs and model.next_job is None,
+            f"{stage} last",
+        ),
         (stage is not Stage.PREPARE or model.page != "run", stage),
         (not model.client.up or model.state.link != "up", "no device"),
         (not indicators.known, "no gates"),

@@ -17,8 +17,8 @@ class Terminal(LinuxDriver):
 
     def start_application_mode(self) -> None:
         """Set the terminal up."""
+        self._left = False  # at once: a SIGCONT may come meanwhile
         super().start_application_mode()  # type: ignore[no-untyped-call]
-        self._left = False
 
     def suspend_application_mode(self) -> None:
         """Restore the terminal temporarily."""

@@ -82,16 +82,6 @@ def test_what_a_stop_has_prevented_is_said():
         assert flow.trouble == f"stopped: {why}"
 
 
-@pytest.mark.parametrize("stage", [Stage.SETTLING, Stage.ARMING, Stage.COUNTDOWN, Stage.LIVE])
-def test_what_fails_says_why_and_can_be_tried_again(stage):
-    flow, _ = through(
-        Flow(stage=stage, job=JOB), on.EffectFailure(-1, "a gate is blocked\nclear it")
-    )
-    assert (flow.stage, flow.trouble) == (Stage.PREPARE, "a gate is blocked\nclear it")
-    flow, _ = through(flow, on.GoOn(JOB))
-    assert flow.trouble == ""
-
-
 tickets = st.integers(-1, 12)
 jobs = st.builds(Job, st.integers(1, 3), st.integers(1, 3))
 happenings = st.one_of(

@@ -58,13 +58,14 @@ def test_ctrl_c_in_a_class_that_is_being_made(monkeypatch, capsys):
     assert "interrupted" in capsys.readouterr().err
 
 
-def test_a_signal_while_the_terminal_is_at_work():
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_the_terminal_is_at_work(number):
     class Headless(App):
         async def run_async(self):
             return await super().run_async(headless=True)
 
         def on_mount(self):
-            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(number)
 
     refused(KeyboardInterrupt, "", lambda: asyncio.run(tui._show(Headless())))
 

@@ -293,7 +293,15 @@ class Box:
     # ------------------------------------------------------------------ what must be true
 
     def check(self):
-        """See that no drop is lost, whatever has happened."""
+        """See that no drop is lost, whatever has happened, and that the log is what is shown."""
+        worker = self.worker
+        if worker and worker.controller.opened and not worker._trouble:
+            shown = worker.published.snapshot()["state"]
+            line, drop = shown["runs"][0], shown["drop"]
+            state = (self.on_disk("state", (1, line["attempt"])) or ["planned"])[-1]
+            assert line["state"] == state, f"{line['state']} is shown, {state} is logged"
+            if drop and state in {"interrupted", "recorded"}:
+                assert drop["state"] == state, "the drop is shown as another"
         held = self.board._controller
         label = held.drop.order.label if held.drop is not None else None
         for job in self.fell:
@@ -347,13 +355,13 @@ class Box:
             with suppress(RigError):
                 self.resume()
             self.passed(6.0 if self.worker._trouble else 0.1)
+            self.check()
             self.accept()
             if self.coming() is None:
                 break
             token = self.arm()
             if isinstance(token, int):
                 self.fire(token)
-            self.check()
         assert self.coming() is None, self.state()
         assert self.worker.published.get("error") is None
         self.check()

@@ -267,23 +267,6 @@ def test_what_a_test_of_the_release_left_on_the_board_is_in_nobodys_way(box):
     assert isinstance(box.arm(), int)
 
 
-def test_a_drop_that_a_restart_of_the_board_cut_is_shown_as_interrupted(box):
-    box.arm()
-
-    def falls(label):
-        box.line = None  # the cable is pulled
-        return box.falls(label)
-
-    box.board.lab.drop = falls
-    box.fire_latest()
-    box.reset()
-    box.board.lab.drop = box.falls
-    box.passed(6.0)
-    drop = box.worker.published.get("drop")
-    assert box.on_disk("state", (1, 1))[-1:] == [drop["state"]] == ["interrupted"]
-    box.ends_well()
-
-
 def test_who_is_held_up_says_by_what_and_whether_anything_is_armed(box, monkeypatch):
     worker = box.worker
 

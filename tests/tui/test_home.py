@@ -148,7 +148,8 @@ async def click(op, words):
     await op.pilot.click(offset=seen[-1])
 
 
-async def test_a_protocol_and_stop_are_clicked(lab, fence):
+async def test_a_protocol_and_stop_are_clicked(lab, fence, monkeypatch):
+    monkeypatch.chdir(lab.folder)  # where files have shorter names than those that were given
     other = lab.folder / "other.yaml"
     other.write_text(fence.replace("TITLE", "The other one"), "utf-8")
     broken = lab.folder / "broken.yaml"

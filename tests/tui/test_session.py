@@ -1,5 +1,6 @@
 """A session driven by keys, against the daemon with a simulated rig."""
 
+import asyncio
 from dataclasses import replace
 
 from rig.campaign.machine import Stage
@@ -67,3 +68,8 @@ async def test_a_second_screen_watches_and_can_only_stop(lab):
         await other.until(lambda: other.app.model.state.holder is None)
         await other.press("c")
         await other.drive()
+        other.app.driver.asked = op.app.driver.asked
+        lab.protocol.write_text("protocol: 1\n", "utf-8")  # so it cannot be opened again
+        await asyncio.to_thread(lab.stop)
+        await other.see("HOME", "fence.yaml:1:1: chains: missing")
+        await op.at(Stage.PROTOCOL)

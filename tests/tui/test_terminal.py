@@ -128,14 +128,19 @@ def test_a_session_by_keys_alone(terminal, url):
 def test_keys_have_one_reader_after_the_program_was_stopped(monkeypatch):
     begins, ends = "start_application_mode", "disable_input"
     done = []
-    for name in (begins, ends):
-        monkeypatch.setattr(LinuxDriver, name, lambda _, name=name: done.append(name))
+
+    def begin(_):
+        done.append(begins)
+        if len(done) == 1:  # while the terminal is being set up
+            signal.raise_signal(signal.SIGCONT)
+
+    monkeypatch.setattr(LinuxDriver, begins, begin)
+    monkeypatch.setattr(LinuxDriver, ends, lambda _: done.append(ends))
 
     async def work():
         terminal = keyboard.Terminal(Mock(), size=(80, 24))
         monkeypatch.setattr(terminal, "write", Mock())
         terminal.start_application_mode()
-        signal.raise_signal(signal.SIGCONT)
         assert done == [begins]
         await asyncio.sleep(0)
         terminal.suspend_application_mode()  # as Ctrl-Z has it

@@ -73,6 +73,7 @@ def test_enter_is_not_offered_before_the_verdict_is_kept():
     assert "Enter after the verdict is saved" in keys_of(replace(shown, flow=waits))
     assert step(kept, GoOn(job, 0.0))[0].job == job
     assert "Enter end" in keys_of(replace(shown, flow=kept))
+    assert "Enter next run" in keys_of(replace(shown, flow=kept, state=DaemonState()))
 
 
 def keys_of(shown, width=80):
@@ -106,22 +107,17 @@ def test_a_state_once_taken_never_changes():
 
 
 def test_indicators_count_name_and_judge_steadiness():
-    indicators = Indicators.of((0, 3)).seen(0b0000, 0.0).seen(0b1000, 1.0)
+    indicators = Indicators.of((0, 3)).seen(0b0001, 0.0).seen(0b1000, 1.0)
     assert indicators.alone == 3
     assert indicators.blocked_channels == (3,)
     indicators = indicators.seen(0, 1.2)
     assert indicators.checked == {3}
-    assert indicators.restless(1.3) == (3,)
+    assert indicators.restless(1.3) == (0, 3)
     assert (indicators.blocked_channels, indicators.restless(2.3)) == ((), ())
-    assert [one.edges for one in indicators.gates] == [0, 2]
+    assert [one.edges for one in indicators.gates] == [1, 2], "blocked at first is no change"
     assert indicators.count_edges((0, 0, 0, 0), 5.0).gates[0].flickers(5.0)
     assert not indicators.seen(None, 3.0).known
     assert indicators.reset().checked == frozenset()
-
-
-def test_a_gate_that_is_blocked_from_the_beginning_has_not_changed():
-    indicators = Indicators.of((2,)).seen(0b100, 0.0)
-    assert (indicators.gates[0].edges, indicators.blocked_channels) == (0, (2,))
 
 
 def _model(**state):

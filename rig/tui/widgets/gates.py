@@ -14,8 +14,8 @@ _WIDE = 39
 
 def board(protocol: Protocol | None, indicators: Indicators, width: int) -> list[Content]:
     """Return a line for each gate, the highest first; both sides side by side if they fit."""
-    if protocol is None or not protocol.gates:
-        return [Content("no gates in this scene")]
+    if protocol is None:
+        return []
     sides = [sorted(protocol.gates.on(side), key=lambda gate: -gate.height) for side in SIDES]
     titles = ("impact side", "free side") if protocol.vocabulary.two_sides else ("gates",) * 2
     columns = [
