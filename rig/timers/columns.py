@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 
@@ -54,6 +54,9 @@ class TimerColumn:
         Of times: decimal power from seconds, `None` where the file does not say their unit.
     gate, run
         Which input and which run all its values are of; empty where the heading does not say.
+    clock, label
+        Of what happened: which column says when, -1 for the number of the row, and what the file
+        calls the input; empty where it does not say.
     state
         ``blocked`` or ``clear`` where the heading says what all its times did to the beam.
     words
@@ -68,6 +71,8 @@ class TimerColumn:
     power: int | None = 0
     gate: str = ""
     run: str = ""
+    clock: int = -1
+    label: str = ""
     state: str = ""
     words: Mapping[str, str] = field(default_factory=dict)
     filled: float = 0.0
@@ -83,40 +88,20 @@ ROW_COUNT = TimerColumn(-1, "", "index")
 """Where rows have neither times nor numbers, they are counted."""
 
 
-@dataclass(eq=False, slots=True)
-class Signal:
-    """A column of times with the column that says what happened, of an input and of a run.
-
-    Attributes
-    ----------
-    clock
-        Of its times, or of the numbers of its samples.
-    value
-        Its states, levels or volts; itself as moments where the heading says what happened.
-    label
-        What the file calls the input; empty where it does not say.
-    """
-
-    clock: TimerColumn
-    value: TimerColumn
-    label: str
-
-
-def columns_of(
-    file: TimerFile, block: RowBlock, rows: Sequence[Row], width: int
-) -> list[TimerColumn]:
+def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[TimerColumn]:
     """Find out what the columns of a block are, in the way in which the file is read.
 
     Parameters
     ----------
-    rows, width
-        The first ones, and how many cells they have at most.
+    rows
+        The first ones.
 
     Raises
     ------
     InputError
         Columns that are called as a setting is.
     """
+    width = max(len(row.texts) for row in rows)
     if width > _WIDEST:
         file.problems.refuse(rows[0].line, "too_many_columns", columns=width, limit=_WIDEST)
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
@@ -129,19 +114,21 @@ def columns_of(
         if row.line > heading.line and kinds_of(row.cell(0)) and 2 * count >= len(facts):
             file.unread.append(row.line)
             file.rows += 1
-    is_counted = facts.keys() >= {0, width - 1} and "counts" in facts[0]
-    if is_counted and 0 < len(heading.texts) < width:
+    if 0 < len(heading.texts) < width and "counts" in facts.get(0, ()):
         heading = heading._replace(texts=["", *heading.texts])  # numbers of rows have no name
     file.facts |= {"beam"} if "any.beam" in counts else set()
     shared = {f"table.{fact}" for fact in counts}
     shared |= {f"columns.{min(len(facts), _MANY)}", f"states.{min(counts['all.state'], _MANY)}"}
     shared |= facts_held({"rated": block.find_time_base()[1]})
-    columns = [_read_column(block, heading, n, facts[n] | shared, cells[n]) for n in facts]
+    columns = [
+        _read_column(block, heading, n, facts[n] | shared, cells[n])
+        for n in facts
+        # Beside named columns a few cells are none.
+        if not heading.texts or heading.cell(n) or 2 * len(cells[n]) > len(rows)
+    ]
     for column in columns:
         column.filled = len(cells[column.at]) / len(rows)
     if not heading.texts:
-        if any(row.count_known() > 1 and len(row.texts) > width for row in block.headings):
-            file.problems.refuse(block.headings[0].line, "heading_unfit", columns=width)
         inputs = [column for column in columns if column.role in SAMPLED]
         for column, name in zip(inputs, block.find_inputs(len(inputs)), strict=False):
             column.gate = column.name = name
@@ -190,10 +177,6 @@ def _read_column(
     above = [name, *(row.cell_over(n) for row in block.headings if row is not heading)]
     run, gate = (next(filter(None, [find_label(x, y) for x in above]), "") for y in ("run", "gate"))
     column = TimerColumn(n, name or f"column {n + 1}", run=run)
-    prefix, _, rest = name.partition(":")
-    is_prefix = sum(x.startswith(f"{prefix}:") for x in heading.texts) > 1
-    if rest.strip() and is_prefix and not find_label(prefix, "gate"):
-        column.run, name = column.run or prefix.strip(), rest
     bare = vocabulary.without_accents(name)
     # Units stand in the heading, or in the row above the data.
     last = [row.cell(n) for row in block.headings[-1:] if name and row.line > heading.line]
@@ -202,7 +185,7 @@ def _read_column(
     is_numbers = form("row of numbers").fullmatch
     numbers = (row.cell(n) for row in block.headings if is_numbers(row.raw))
     column.gate = gate or next(numbers, "")
-    roles_of_name = vocabulary.roles_in(bare)
+    roles_of_name = vocabulary.roles_in(bare.replace(find_label(bare, "run"), ""))
     named = {
         "time": unit in POWERS
         and vocabulary.normal(name).strip("()[] ") in vocabulary.words()[f"unit {unit}"],
@@ -250,27 +233,30 @@ def _facts_of_values(texts: Sequence[str]) -> set[str]:
     )
 
 
-def pair_columns(columns: Sequence[TimerColumn]) -> Iterator[Signal]:
-    """Give each column of times what belongs to it: values of its run and input, and names."""
+def pair_columns(columns: Sequence[TimerColumn]) -> dict[TimerColumn, list[TimerColumn]]:
+    """Give each column of times, or of numbers of samples, those that say what happened then.
+
+    They are of its run and input. A column of times may tell of moments by itself.
+    """
     counts = [column for column in columns if column.role == "index"][:1] or [ROW_COUNT]
     times = [column for column in columns if column.role == "time"]
     # Of columns that say the same times in other units, the finest is kept.
     finest = {_part_of(c): c.power for c in sorted(times, key=lambda c: c.power or 0)}
     times = [c for c in times if c.power == finest[_part_of(c)]] or counts
     chosen = next((v for v in VALUES if any(c.role in v for c in columns)), ())
-    is_sampled = chosen == SAMPLED
-    clocks = {c: min(times, key=partial(_distance, c)) for c in columns if c.role in chosen}
-    for clock in times:
-        values = [column for column in clocks if clocks[column] is clock]
-        # Without values it shares those of another run, or tells of changes by itself.
-        if not (values or is_sampled):
-            shared = [x for x in clocks if _part_of(clocks[x]) == _part_of(clock)]
-            values = shared or [replace(clock, at=ROW_COUNT.at, role="moment")]
-        labels = Counter(map(_label_of, values))
-        for n, value in enumerate(values, 1):
-            label = _label_of(value) if is_sampled or values[1:] else clock.gate or value.gate
-            label += f" ({n})" if is_sampled and labels[label] > 1 else ""
-            yield Signal(clock, value, label)
+    nearest = {x: min(times, key=partial(_distance, x)) for x in columns if x.role in chosen}
+    clocks = {clock: [x for x in nearest if nearest[x] is clock] for clock in times}
+    for clock, signals in clocks.items():
+        if not signals and chosen != SAMPLED:
+            signals.append(replace(clock, at=ROW_COUNT.at, role="moment"))
+        for n, signal in enumerate(signals, 1):
+            signal.clock, signal.run = clock.at, clock.run or signal.run
+            is_name = chosen == SAMPLED and signal.gate in signal.name and not signal.run
+            label = signal.gate or clock.gate or signal.name * (len(signals) > 1)
+            signal.label = signal.name if is_name else label
+            if chosen == SAMPLED and signal.label in {x.label for x in signals[: n - 1]}:
+                signal.label += f" ({n})"
+    return {clock: signals for clock, signals in clocks.items() if signals}
 
 
 def _part_of(clock: TimerColumn) -> tuple[str, str, str]:
@@ -282,9 +268,3 @@ def _distance(value: TimerColumn, clock: TimerColumn) -> tuple[bool, bool, bool,
     is_other_run = bool(value.run) and clock.run not in {value.run, ""}
     is_other_gate = not clock.gate or clock.gate != value.gate
     return is_other_run, is_other_gate, clock.at > value.at, abs(clock.at - value.at)
-
-
-def _label_of(value: TimerColumn) -> str:
-    """Return what the file calls an input: the heading of samples, or the gate's name in it."""
-    is_named = value.role in SAMPLED and value.gate in value.name and not value.run
-    return value.name if is_named or not value.gate else value.gate

@@ -111,19 +111,20 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
                 raise refusal(f"--{name.replace('_', '-')}", "own_format_stated")
         return Import(read_edges(place), {}, [f"the project's own format: {','.join(HEADER)}"], [])
     readings = _find_readings(options, gates, bars)
-    reading, match, fitting = readings[0], FallMatch(), list[Reason]()
+    reading, match = readings[0], FallMatch()
     if not options.as_read:
         reading, match = _choose(readings, place, fit)
         _refuse_impossible(reading, place)
-        fitting = [make_reason("reading_chosen", option=str(reading.layout), fit=match.text)]
     file, channels = reading.file, reading.layout.channels
-    notes = [*file.notes, _account(reading, options), *fitting, *match.doubts]
+    notes = [*file.notes, _account(reading, options)]
+    if match.text:
+        notes.append(make_reason("reading_chosen", option=str(reading.layout), fit=match.text))
     if options.map_file and not Path(options.map_file).exists():
         Path(options.map_file).write_text(f"{reading.layout.text}\n", "utf-8")
     pairs = [f"input {x} is the gate at channel {n}" for x, n in channels.items() if x]
     lines = [*file.lines, *pairs, str(reading.layout), *filter(None, [match.text])]
-    drops = [*map(reading.drop, reading.runs)]
-    return Import(drops, channels, lines, [*notes, *_assumptions(reading, gates)])
+    notes += [*match.doubts, *_assumptions(reading, gates)]
+    return Import([*map(reading.drop, reading.runs)], channels, lines, notes)
 
 
 def _find_readings(options: Namespace, gates: Sequence[int], bars: int) -> list[FileReading]:

@@ -126,7 +126,7 @@ class FileReading:
         # Before a drop, a file may say that its beams are clear.
         is_said = drop < next(iter(drop[is_edge & blocked]), 0)
         is_edge &= ~is_said
-        self.states = changes.line[is_said].tolist()
+        self.states = changes.line[is_said & is_gate].tolist()
         edges = np.rec.fromarrays(
             [drop, changes.tick, channel, blocked, changes.line, changes.clock],
             formats="i8,O,i8,?,i4,i4",
@@ -154,8 +154,7 @@ class FileReading:
         """Share of the edges near a fall's, of all that came or were due, that is credible."""
         facts = {*self.file.facts, self.layout.dark, self.layout.groups}
         is_guess = facts & {"guess", "inverted", "passing", "unsorted"}
-        is_broken = "turns" in self.layout.dark and not self.is_whole
-        return _GOOD_GUESS if is_guess or is_broken else _GOOD
+        return _GOOD_GUESS if is_guess or not self.is_whole else _GOOD
 
     @property
     def oddities(self) -> int:
@@ -167,13 +166,13 @@ class FileReading:
     def is_whole(self) -> bool:
         """Whether beams are clear at the beginning, and in the end, as a protocol has them.
 
-        Where the file says when they are blocked, it is not doubted.
+        Where the file says when they are, rows may be missing, but none says the contrary.
         """
         beams = self.edges.run * 100 + self.edges.channel
         _, first, counts = np.unique(beams, return_index=True, return_counts=True)
-        if self.layout.dark.startswith("turns"):
-            return not np.any(counts % 2)
-        return self.layout.dark not in {"high", "low"} or bool(np.any(self.edges.blocked[first]))
+        is_odd = counts % 2 > 0
+        is_turn = self.layout.dark.startswith("turns")
+        return not np.any(is_odd if is_turn else ~self.edges.blocked[first] & ~is_odd)
 
 
 def _number_runs(numbers: Sequence[int | None]) -> list[int]:

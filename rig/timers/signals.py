@@ -19,14 +19,14 @@ import numpy as np
 
 from rig.arrays import Array
 from rig.reasons import make_reason
-from rig.timers.columns import SAMPLED, Signal, TimerColumn, columns_of, pair_columns, roles
+from rig.timers.columns import SAMPLED, TimerColumn, columns_of, pair_columns, roles
 from rig.timers.crossings import find_crossings
 from rig.timers.lines import is_cut, read_lines
 from rig.timers.moments import HALF_DAY, OVERFLOWS, TICK_HZ, moment
 from rig.timers.table import Row, RowBlock, Table
 from rig.timers.timer_file import CHANGE, STATES, Records, TimerFile
 from rig.timers.vcd import BEGINNINGS, vcd_rows
-from rig.timers.vocabulary import facts_held, form, is_number, state_of
+from rig.timers.vocabulary import facts_held, is_number, kinds_of, state_of
 
 MAX_EVENTS = 500_000
 """Those of 600 drops of 25 rods past 16 gates; what has more is no record of drops."""
@@ -50,15 +50,7 @@ def read_file(file: TimerFile) -> TimerFile:
     readers, changes = dict[object, SignalReader](), [np.empty(0, CHANGE)]
     with closing(read_lines(file.path)) as lines:
         head = list(itertools.islice(lines, 50))
-        whole: Iterable[str] = itertools.chain(head, lines)
-        if "".join(head[:1]).strip() in {"[", "{"}:  # what is in no other list is a line
-            # Empty lines below keep the numbers of those that follow.
-            whole = (
-                form("innermost list")
-                .sub(lambda x: x[0].replace("\n", " ") + "\n" * x[0].count("\n"), "\n".join(whole))
-                .split("\n")
-            )
-        numbered = enumerate(whole, 1)
+        numbered = enumerate(itertools.chain(head, lines), 1)
         is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
         table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered, file.way)
         file.ways = file.separators = table.ways
@@ -70,8 +62,7 @@ def read_file(file: TimerFile) -> TimerFile:
                 readers[block.key] = SignalReader(file, block, sample)
             changes.append(readers[block.key].read(block, itertools.chain(sample, rows)))
     file.problems.raise_if_any()
-    table_changes = np.concatenate(changes).view(np.recarray)
-    file.changes = table_changes[table_changes.line.argsort(kind="stable")]
+    file.changes = np.concatenate(changes).view(np.recarray)
     # Below the last row text may stand.
     table.strays += [number for number in table.words if number < file.last_row]
     file.rows += len(table.strays)
@@ -102,24 +93,24 @@ class SignalReader:
     """
 
     def __init__(self, file: TimerFile, block: RowBlock, sample: list[Row]) -> None:
-        self.file, self.width = file, max(len(row.texts) for row in sample)
-        columns = columns_of(file, block, sample, self.width)
-        signals = [*pair_columns(columns)]
-        self.clocks = {x: [*y] for x, y in itertools.groupby(signals, lambda signal: signal.clock)}
+        columns = columns_of(file, block, sample)
+        self.file, self.known = file, {column.at for column in columns}
+        self.clocks = pair_columns(columns)
+        self.signals = [*itertools.chain(*self.clocks.values())]
         self.base, self.latest = block.find_time_base(), dict[TimerColumn, int]()
         self.above = dict[str, str]()
-        if signals[0].clock.role != "time" and not self.base[1]:
+        if next(iter(self.clocks)).role != "time" and not self.base[1]:
             durations = ", ".join(repr(x.name) for x in columns if x.role == "duration")
             values = {"numbers": durations, "lacks": "a column of times (s, ms, µs, ns) or a rate"}
             line = (block.headings or sample)[0].line
             file.problems.refuse(line, "durations" if durations else "no_rate", **values)
         used = {column.role: column for column in reversed(columns)}
-        is_filled = 2 * sum(signal.value.filled for signal in signals) > len(signals)
+        is_filled = 2 * sum(signal.filled for signal in self.signals) > len(self.signals)
         has_volts = "volts" in used
         self.places = {x: used[x] for x in ("run", "gate") if x in used and not has_volts}
         self.is_sampled = has_volts or ("level" in used and is_filled)
-        self.is_whole = is_filled and (self.is_sampled or len(signals) > len(self.clocks))
-        needed = {*self.places.values(), *self.clocks, *(signal.value for signal in signals)}
+        self.is_whole = is_filled and (self.is_sampled or len(self.signals) > len(self.clocks))
+        needed = {*self.places.values(), *self.clocks, *self.signals}
         unused = ", ".join(x.name for x in columns if x.role != "index" and x not in needed)
         file.notes += [make_reason("columns_unused", columns=unused)] if unused else []
         file.lines += [f"  {column}" for column in columns]
@@ -135,9 +126,9 @@ class SignalReader:
     def read(self, block: RowBlock, rows: Iterable[Row]) -> Records:
         """Return the changes that rows say; a row may say that nothing changes, or be unread."""
         file, self.block, self.count, self.steps = self.file, block, 0, array("d")
-        self.starts, self.states = dict[TimerColumn, int](), dict[Any, tuple[str, str]]()
-        self.changes, signals = list[Any](), itertools.chain(*self.clocks.values())
-        self.samples = {x: array("d") for x in signals if x.value.role == "volts"}
+        self.starts, self.states = dict[int, int](), dict[Any, tuple[str, str]]()
+        self.changes = list[Any]()
+        self.samples = {x: array("d") for x in self.signals if x.role == "volts"}
         for row in rows:
             for role, column in self.places.items():
                 # Of merged cells only the first has a text.
@@ -148,7 +139,8 @@ class SignalReader:
                 for clock, signals in self.clocks.items()
                 if (tick := self._read_time(row, clock)) is not None
             }
-            if is_read != {True} or any(row.texts[self.width :]):
+            rest = [x for n, x in enumerate(row.texts) if x and n not in self.known]
+            if is_read != {True} or any(map(kinds_of, rest)):  # words may stand behind
                 file.unread.append(row.line)
             if len(self.changes) > MAX_EVENTS:
                 file.problems.refuse(row.line, "too_many_events", limit=MAX_EVENTS)
@@ -176,49 +168,50 @@ class SignalReader:
             tick = round(self.base[0] * TICK_HZ + self.base[1] * tick)
         latest = self.latest.get(clock, tick)  # of the block above, too: a counter goes on
         if tick < latest:
-            for wrap in HALF_DAY, *(n * 10 ** (12 - (clock.power or 0)) for n in OVERFLOWS):
+            counters = [n * 10 ** (12 - (clock.power or 0)) for n in OVERFLOWS]
+            for wrap in [HALF_DAY] if ":" in text else counters:
                 pause = (tick - latest) % wrap
                 tick = latest + pause if 8 * pause < wrap else tick
-        if self.is_sampled and tick < latest and clock in self.starts and not self.places:
+        if self.is_sampled and tick < latest and clock.at in self.starts and not self.places:
             self.file.problems.add(*row.place(clock.at), "time", "backwards", text=text)
-        self.starts.setdefault(clock, tick)
+        self.starts.setdefault(clock.at, tick)
         self.latest[clock] = tick
         self.steps.append(tick - latest)
         return tick
 
-    def _read_value(self, row: Row, tick: int, signal: Signal) -> bool:
+    def _read_value(self, row: Row, tick: int, signal: TimerColumn) -> bool:
         """Keep what a cell says: a sample of volts, or a state if that is a change."""
-        value, word = signal.value, row.cell(signal.value.at)
-        if not (word or self.is_sampled or value.role == "moment"):
+        word = row.cell(signal.at)
+        if not (word or self.is_sampled or signal.role == "moment"):
             return False
         key = signal, *self.above.values()
         before, text = self.states.get(key, (None, None))
         if self.is_whole and word == text:  # in nearly all rows of levels
             return True
-        state = meaning_of(value.role, value.words.get(word, word) or value.state)
+        state = meaning_of(signal.role, signal.words.get(word, word) or signal.state)
         if state is None:
-            self._reject(row, value, word)
+            self._reject(row, signal, word)
         elif isinstance(state, float):
             self.samples[signal].extend((row.line, tick - self.starts[signal.clock], state))
-        elif state or value.role == "moment":
+        elif state or signal.role == "moment":
             self.states[key] = state, word
             if not self.is_whole or before != state:
                 self._add_change(signal, row.line, tick, state, self.is_whole and before is None)
         return True
 
     def _add_change(
-        self, signal: Signal, line: int, tick: int, state: str, is_first: bool = False
+        self, signal: TimerColumn, line: int, tick: int, state: str, is_first: bool = False
     ) -> None:
         """Keep a change, or what may be the state at the beginning of a run.
 
         Its run and input are named in the row, in its heading, or in a mark above.
         """
-        run = self.above.get("run") or signal.clock.run or signal.value.run or self.block.run
+        run = self.above.get("run") or signal.run or self.block.run
         gate = self.above.get("gate") or signal.label or self.block.gate
-        place = self.file.names[run], self.file.names[gate], signal.clock.at, self.block.number
+        place = self.file.names[run], self.file.names[gate], signal.clock, self.block.number
         self.changes.append((line, tick, STATES.index(state), *place, is_first))
 
-    def _find_crossings(self, signal: Signal, samples: Array) -> None:
+    def _find_crossings(self, signal: TimerColumn, samples: Array) -> None:
         """Keep where volts cross the middle; note how many do, or that nothing passes."""
         level, crossings = find_crossings(samples)
         code, values = "crossings", {"crossings": len(crossings), "level": level}

@@ -13,6 +13,7 @@ import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import NamedTuple
 
 from rig.timers import vocabulary
@@ -22,21 +23,12 @@ _Shape = tuple[tuple[bool, bool], ...]
 """Of each cell whether it is filled, and a number."""
 _Name = tuple[str, int]
 """Words before a value, and how many values with the same are before it in its line."""
-_UNFILLED = {"setting", "index", "derived"}
-"""Roles of columns that may have a name and no values: a rate, comments, or distances."""
-_ROLES = {
-    "time",
-    "elapsed",
-    "state",
-    "edge",
-    "volts",
-    "gate",
-    "run",
-    "duration",
-    "index",
-    "derived",
-}
+_NO_ROLES = {"derived", "index"}
+"""Of columns that any table may have."""
+_ROLES = _NO_ROLES | {"time", "elapsed", "state", "edge", "volts", "gate", "run", "duration"}
 """Those that columns may have."""
+_Lines = Iterable[tuple[int, str]]
+"""Lines of a file with their numbers."""
 _UNITS = vocabulary.POWERS | {"": 0, "hz": 0, "khz": -3, "mhz": -6, "ghz": -9, "ks/s": -3}
 """Decimal power from seconds, or from hertz."""
 _JUDGED = 100
@@ -93,28 +85,24 @@ class RowBlock:
     def find_heading(self, width: int, filled: Collection[int]) -> Row:
         """Return the row with most cells that are known, the lowest of those with most names.
 
-        Above and below may stand symbols and units. Above settings, rows with a measured number,
-        only a row that names every column is no setting itself; nor is one with more or fewer names
-        than there are columns. A remark may name the columns where nothing else does.
+        Above and below may stand symbols, units and settings. A remark may name the columns where
+        nothing else does.
 
         Parameters
         ----------
         filled
             Columns that have values.
         """
-        ranked = list[tuple[int, int, Row]]()
         remarks = [x for x in self.remarks if len(x.texts) == width < 2 * x.count_known()]
         remarks = [x for x in remarks if not form("assignment").search(x.raw)]
-        for row in self.headings or remarks:
-            if any(map(is_measured, row.texts)) and not form("time and numbers").fullmatch(row.raw):
-                ranked = [rank for rank in ranked if rank[0] >= len(filled)]
-            elif (
-                (known := row.count_known(filled))
-                and len(row.texts) > width - 2  # rows may end with a separator
-                and all(_UNFILLED & roles_in(text) for text in row.texts[width:] if text)
-            ):
-                ranked.append((known, len({*row.texts}), row))
-        return max(reversed(ranked), key=lambda rank: rank[:2], default=(0, 0, Row(0, [])))[-1]
+        named = [
+            (known, len({*row.texts}), row)
+            for row in reversed(self.headings or remarks)
+            if len(row.texts) > width - 2  # rows may end with a separator
+            and row.is_text
+            and (known := row.count_known(filled))
+        ]
+        return max(named, key=lambda rank: rank[:2], default=(0, 0, Row(0, [])))[-1]
 
     def find_time_base(self) -> tuple[float, float]:
         """Return the first sample's time and the step, s, that settings state; 0 without."""
@@ -164,19 +152,26 @@ class Row(NamedTuple):
         """Count the cells, of some columns or of all, that say what a column is."""
         texts = [text for n, text in enumerate(self.texts) if columns is None or n in columns]
         roles = [{*(roles_in(x) & _ROLES), vocabulary.unit_of(x)} - {""} for x in texts]
-        is_heading = bool(set().union(*roles) - {"derived", "index"})
+        is_heading = bool(set().union(*roles) - _NO_ROLES)
         return sum(map(bool, roles)) if is_heading and "units" not in roles_in(texts[0]) else 0
+
+    @property
+    def is_text(self) -> bool:
+        """Whether it has no measured numbers, but for those of inputs behind a time."""
+        is_numbers = form("time and numbers").fullmatch
+        return not any(map(is_measured, self.texts)) or is_numbers(self.raw) is not None
 
     @property
     def is_mark(self) -> bool:
         """Whether it says that another run, or gate, begins: ``--- Run 2 ---``."""
-        text = vocabulary.normal(" ".join(self.texts)).strip("-=*#:<>[] ")
-        return form("mark").fullmatch(text) is not None
+        # Between words, a mark has no values that are named.
+        text = vocabulary.normal(" ".join(self.texts).strip() or self.raw)
+        return form("mark").fullmatch(text.strip("-=*#:<>[] ")) is not None
 
     @property
     def is_heading(self) -> bool:
         """Whether it stands above its block again, or has no numbers and is known by half."""
-        return not any(map(is_measured, self.texts)) and (
+        return self.is_text and (
             self.texts in [row.texts for row in self.block.headings]
             or 0 < len(self.texts) <= 2 * self.count_known()
         )
@@ -210,13 +205,15 @@ class Table:
         Lines among rows that are neither rows nor headings: with a value, or without.
     """
 
-    def __init__(self, lines: Iterable[tuple[int, str]], way: int = 0) -> None:
+    def __init__(self, lines: _Lines, way: int = 0) -> None:
         self.strays, self.words = list[int](), list[int]()
         unwrapped = ((number, piece) for number, line in lines for piece in _unwrap(line))
         sample = list(itertools.islice(unwrapped, _SAMPLE))
-        self._lines = itertools.chain(sample, unwrapped)
         plain = [line for _, line in sample if line.strip() and not vocabulary.is_remark(line)]
         self._names, named = _find_names(plain)
+        self._lines: Iterator[tuple[int, str]] = itertools.chain(sample, unwrapped)
+        if self._names:
+            self._lines = _join_fields(self._lines, self._names)
         separators = find_separators(plain, named)
         self.separator, self.has_thousands = separators[way % len(separators)], False
         self._usual: _Shape = ()
@@ -315,17 +312,17 @@ def split_cells(line: str, separator: str, usual: _Shape = ()) -> list[str]:
 
 def _unwrap(line: str) -> list[str]:
     """Return a line without the brackets around it; lists in a line are lines of their own."""
-    line = form("exponent of Fortran").sub("E", line) if "D" in line else line
-    line = form("remark behind").sub("", line) if "#" in line or "//" in line else line
-    if clock := form("clock before").match(line):  # the monitor's, not the program's
-        rest = line[clock.end() :]
-        line = clock[1] + next(filter(rest.__contains__, ",;\t"), " ") + rest
-    if line[:1].isdigit() or not form("list").match(line):
+    if form("plain row").fullmatch(line):  # as most
+        return [line]
+    line = form("remark behind").sub("", form("exponent of Fortran").sub("E", line))
+    line = form("clock before").sub(r"\1\5 ", line)  # the monitor's, not the program's
+    if not form("list").match(line):
         return [line]
     pieces = form("between lists").split(line)
     return [form("list").sub("", piece, 1).rstrip("])}, ;") for piece in pieces]
 
 
+@lru_cache(1)
 def _named_values(line: str) -> list[tuple[_Name, str]]:
     """Return the values between the words of a line, each with the words right before it."""
     values, end, counts = [], 0, Counter[str]()
@@ -339,12 +336,34 @@ def _named_values(line: str) -> list[tuple[_Name, str]]:
 
 
 def _find_names(lines: Sequence[str]) -> tuple[list[_Name], int]:
-    """Return what most lines name before their values, and how many values they name so."""
+    """Return what most lines name before their values, and how many values they name so.
+
+    Of records over several lines, of which each names a value, it is what these name.
+    """
     rows = Counter(tuple(dict(_named_values(line))) for line in lines[-_JUDGED:])
     del rows[()]
-    usual, count = next(iter(rows.most_common(1)), ((), 0))
-    is_named = any(name[1:] for name, _ in usual) and 2 * count > rows.total()
-    return ([*usual], count * len(usual)) if is_named else ([], 0)
+    usual, most = next(iter(rows.most_common(1)), ((), 0))
+    fields = [x for x, count in rows.items() if len(x) == 1 and x[0][0] and 2 * count >= most > 1]
+    if len(fields) > 1:
+        return [name for (name,) in fields], sum(map(rows.__getitem__, fields))
+    is_named = any(name[1:] for name, _ in usual) and 2 * most > rows.total()
+    return ([*usual], most * len(usual)) if is_named else ([], 0)
+
+
+def _join_fields(lines: _Lines, names: Collection[_Name]) -> Iterator[tuple[int, str]]:
+    """Make a line of lines that name a value each, until a name comes again, or another line."""
+    record, at = dict[_Name, str](), 0
+    for number, line in itertools.chain(lines, [(0, "")]):
+        name, *others = dict(_named_values(line)) or [("", 0)]
+        is_field = name in names and not others
+        if record and (not is_field or name in record):
+            yield at, ", ".join(record.values())
+            record.clear()
+        at = at if record else number
+        if is_field:
+            record[name] = line.strip(" ,")
+        else:
+            yield number, line
 
 
 def find_separators(lines: Sequence[str], named: int) -> list[str]:
@@ -370,9 +389,8 @@ def find_separators(lines: Sequence[str], named: int) -> list[str]:
 
 
 def _begins_as(texts: Sequence[str], usual: _Shape) -> bool:
-    """Whether the first cells are as those of most rows, perhaps with a setting to the left."""
-    left = next((n - 1 for n, cell in enumerate(usual) if any(cell) and n), 0)
-    return usual != () and _shape(texts[: len(usual)])[left:] == usual[left:]
+    """Whether the first cells are as those of most rows."""
+    return usual != () and _shape(texts[: len(usual)]) == usual
 
 
 def _shape(texts: Sequence[str]) -> _Shape:

@@ -157,7 +157,5 @@ def is_remark(line: str) -> bool:
 
 def number_of(label: str) -> int | None:
     """Return the number in an input's name: 3 of D3, of ``Channel 3 (V)`` and of 3.0."""
-    if is_number(label) and float(label) < LONGEST:
-        return int(float(label))
-    match = re.search(r"([0-9]{1,9})$", re.sub(r"[\[(].*", "", label).strip())
+    match = form("number of a label").search(label)
     return int(match[1]) if match else None

@@ -163,7 +163,7 @@ NOT_READ = {
     "A channel for all gates", "Samples of a channel for all gates",
     "Durations", "A summary below", "A name for two columns",
     "Minutes and seconds", "Seconds that are called minutes",
-    "More names than columns", "Samples with an index",
+    "Samples with an index",
     "Two tables", "Twice the same", "Changes in nanoseconds",
     "Microseconds as if they were seconds",
     "The last row cut", "A row twice", "An unknown column in a unit of time",
