@@ -343,20 +343,19 @@ def _find_names(lines: Sequence[str]) -> tuple[list[_Name], int]:
     rows = Counter(tuple(dict(_named_values(line))) for line in lines[-_JUDGED:])
     del rows[()]
     usual, most = next(iter(rows.most_common(1)), ((), 0))
-    fields = [x for x, count in rows.items() if len(x) == 1 and x[0][0] and 2 * count >= most > 1]
-    if len(fields) > 1:
-        return [name for (name,) in fields], sum(map(rows.__getitem__, fields))
+    fields = [x for x, n in rows.items() if x[0][0] and not x[1:] and 2 * n >= most > 1]
     is_named = any(name[1:] for name, _ in usual) and 2 * most > rows.total()
-    return ([*usual], most * len(usual)) if is_named else ([], 0)
+    fields = fields if len(fields) > 1 else [usual] * is_named
+    return [*itertools.chain(*fields)], sum(len(x) * rows[x] for x in fields)
 
 
 def _join_fields(lines: _Lines, names: Collection[_Name]) -> Iterator[tuple[int, str]]:
-    """Make a line of lines that name a value each, until a name comes again, or another line."""
+    """Make a line of lines that name a value each, until all have come, or one comes again."""
     record, at = dict[_Name, str](), 0
     for number, line in itertools.chain(lines, [(0, "")]):
-        name, *others = dict(_named_values(line)) or [("", 0)]
+        name, *others = dict(_named_values(line)) or [("", -1)]
         is_field = name in names and not others
-        if record and (not is_field or name in record):
+        if record and (name in record or len(record) == len(names) or not number):
             yield at, ", ".join(record.values())
             record.clear()
         at = at if record else number
