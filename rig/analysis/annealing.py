@@ -45,7 +45,7 @@ _FAR = 2.5
 """Radius of the grid of starts in prior standard uncertainties: 99 % of drops as stated."""
 _NODES = 400
 PEAKS = 5
-"""Starts of a batch that are annealed, and grid points of the first batch."""
+"""Starts of a batch that are annealed; half of the grid points of the first batch."""
 LEAST = 0.6
 """Least share of the expected edges that a fall must explain. Also the least share of the best
 start's votes with which another start is tried, and the largest share of edges that it may assign
@@ -450,7 +450,7 @@ class SideFall:
         ndarray
             Falls in descending order of votes.
         """
-        nodes, size = self.nodes(), PEAKS
+        nodes, size = self.nodes(), 2 * PEAKS
         while len(nodes):
             batch, nodes = nodes[:size], nodes[size:]
             size *= 2
@@ -461,11 +461,11 @@ class SideFall:
 
     def most_votes(self) -> int:
         """Return the most votes for any fall of the grid's first, likeliest batch."""
-        return int(self._count_votes(self.nodes(PEAKS))[1].max(initial=0))
+        return int(self._count_votes(self.nodes(2 * PEAKS))[1].max(initial=0))
 
     def most_matches(self) -> int:
         """Return how many edges agree, each with a side of its own, with the fall of most votes."""
-        falls, votes = self._count_votes(self.nodes(PEAKS))
+        falls, votes = self._count_votes(self.nodes(2 * PEAKS))
         fall, (edge, side) = falls[np.argsort(-votes)[:1]], self.pairing.pairs
         heights = self.path(fall).heights(self.since(fall, self.record.edges.times))[0]
         near = (np.abs(heights[:, edge] - self.levels[side]) <= self.slack).any(axis=0)
