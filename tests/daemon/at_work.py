@@ -18,6 +18,7 @@ def ended(processes: ProcessFixture, code: int = 0) -> str:
     _, told = processes.daemon.communicate(timeout=PATIENCE_S)
     assert processes.daemon.returncode == code, told
     assert "Traceback" not in told
+    assert code or told.endswith("rig daemon: ended\n")
     return told
 
 

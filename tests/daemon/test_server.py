@@ -273,7 +273,8 @@ async def test_who_says_nothing_is_told_so_and_sent_away(door, monkeypatch):
 NAMES = ["\ud800x", "\x1b[2J", "\u202etxt.exe", "a\nb", "\0", "ü" * 500]
 
 
-async def test_whatever_a_client_is_called_all_see_it(door):
+async def test_whatever_a_client_is_called_all_see_it(door, caplog):
+    caplog.set_level("INFO", "rig.daemon.service")
     watcher = await AsyncClient.connect(door.path, "watcher")
     await watcher.call("subscribe")
     for name in NAMES:
@@ -290,6 +291,8 @@ async def test_whatever_a_client_is_called_all_see_it(door):
         await client.close()
         while watcher.replica.state["control"] is not None:
             await asyncio.sleep(0)
+        assert caplog.messages[-2:] == [f"in control: {shown}", "in control: nobody"]
+    assert len(caplog.messages) == 2 * len(NAMES)
     await watcher.close()
 
 

@@ -152,14 +152,6 @@ def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(box):
     box.ends_well()
 
 
-def test_a_drop_is_shown_with_as_many_events_as_its_certificate_has(box):
-    box.board.lab.drop = lambda _label: [(0.1, 0, True), (0.1, 1, True), (0.2, 0, False)]
-    token = box.arm()
-    box.asked(lambda c: c.fire(token))
-    assert box.worker.published.get("drop")["events"] == 2
-    assert len(box.worker.published.snapshot()["state"]["edges"]) == 3
-
-
 def test_whoever_leaves_once_it_is_let_go_has_it_recorded_whole(box):
     token = box.arm()
     box.wanted = box.tokens[token]
@@ -170,43 +162,6 @@ def test_whoever_leaves_once_it_is_let_go_has_it_recorded_whole(box):
     drop = box.worker.controller.session.drop(1, 1)
     assert (len(drop.edges), drop.faults) == (8, ()), "two rods at two gates"
     assert drop.certificate.pulse_ticks / drop.tick_hz == pytest.approx(0.08, rel=0.01)
-
-
-def test_a_worker_with_nothing_to_do_rests(box):
-    box.turned = Mock(wraps=box.turned)
-    box.passed(3.0)
-    assert 3 <= box.turned.call_count < 60
-
-
-def test_what_gates_see_is_shown_though_nobody_is_in_control(box):
-    box.lease.release("A")
-    box.worker.published.watched = True
-    box.board.touch(1)
-    box.passed(1.0, client="")
-    assert box.worker.published.get("gates") == {"blocked": 1}
-
-
-def test_a_test_of_the_release_tells_what_was_seen_of_it(box):
-    """It is watched for half a second behind the pulse, and stands beside the drop before it."""
-    box.arm()
-    box.fire_latest()
-    box.passed(1.0)
-    box.board.lab.drop = lambda _label: [(0.2, 1, True), (0.579, 1, False), (0.5805, 0, True)]
-    box.board.sense(0.012)
-    seen, phase = box.asked(lambda c: (c.test_release(), c.published.get("phase")))
-    assert (seen["edges"], seen["gates"], seen["faults"], phase) == (2, [1], [], "idle")
-    assert seen["release_sense_s"] == pytest.approx(0.012, rel=0.01)
-    assert box.worker.published.get("drop")["state"] == "recorded"
-
-
-def test_a_wait_lasts_as_long_as_asked_and_what_it_measures_is_on_the_disk(box):
-    def waited(controller):
-        begun_s = box.now()
-        controller.wait(1.5)
-        trip_s = controller.recorder.statistics()["round_trip_s"]
-        return box.now() - begun_s, trip_s, controller.session.pending
-
-    assert box.asked(waited) == pytest.approx((1.5, 0.005, 0), abs=0.005)
 
 
 def test_a_test_of_the_release_needs_control_a_session_nothing_armed_and_a_closed_stop(box):
@@ -267,23 +222,6 @@ def test_what_a_test_of_the_release_left_on_the_board_is_in_nobodys_way(box):
     assert isinstance(box.arm(), int)
 
 
-def test_a_drop_that_a_restart_of_the_board_cut_is_shown_as_interrupted(box):
-    box.arm()
-
-    def falls(label):
-        box.line = None  # the cable is pulled
-        return box.falls(label)
-
-    box.board.lab.drop = falls
-    box.fire_latest()
-    box.reset()
-    box.board.lab.drop = box.falls
-    box.passed(6.0)
-    drop = box.worker.published.get("drop")
-    assert box.on_disk("state", (1, 1))[-1:] == [drop["state"]] == ["interrupted"]
-    box.ends_well()
-
-
 def test_who_is_held_up_says_by_what_and_whether_anything_is_armed(box, monkeypatch):
     worker = box.worker
 
@@ -318,15 +256,6 @@ def test_what_waits_for_the_disk_is_said_once_and_only_where_anything_does(box):
     session.log_bytes("rx", 1, b"x")
     box.worker._weigh(full)
     assert len(full.reasons) == 1
-
-
-def test_a_board_is_watched_without_a_session_and_its_port_is_kept_for_the_next(box):
-    box.worker.controller.close()
-    box.passed(1.5)
-    line = box.line
-    assert line.is_open
-    box.resume()
-    assert box.line is line
 
 
 def test_what_the_board_holds_otherwise_than_the_session_is_not_forgotten(box):

@@ -3,13 +3,13 @@
 import socket
 import sys
 from dataclasses import replace
+from itertools import groupby
 
 import pytest
 import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.boards import LONGEST_RECORD_MS
 from rig.clock.host import SystemClock
 from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
@@ -20,7 +20,7 @@ from rig.link.port import open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Incoming, Restart, Transcript
 from rig.reasons import make_reason
-from rig.records import ClockSample
+from rig.records import ClockSample, Drop
 from sim.clock import VirtualClock
 from tests.daemon.far_port import FarPort
 from tests.flash.pty_board import PtyBoard
@@ -32,6 +32,7 @@ from tests.tables import cases
 from tests.waiting import until
 
 SMALL = st.integers(0, 3)
+ALWAYS = lambda: True  # noqa: E731
 
 
 class FakePort:
@@ -75,10 +76,29 @@ IDENTITY = wire.Identity(
 )
 
 
-def test_the_first_byte_is_a_delimiter(clock):
-    port = FakePort(clock, {wire.Identify: [IDENTITY]})
-    assert Device(port, clock).connect() == IDENTITY
-    assert port.written[0] == b"\0"
+def spoken(data: bytes) -> str:
+    """Name what a client writes: a request, or what is no frame."""
+    (name,) = [wire.TABLE[frame.type].__name__ for frame in Decoder().feed(data)] or [data.hex()]
+    return name
+
+
+@cases
+def test_each_talk_takes_its_course(clock, ask, answers, said, told, counted):
+    """What is written how often, when first and when last, ms; what comes of it, and the counts."""
+    port, written = FakePort(clock, {}), []
+    for kind, messages in answers.items():
+        port.answers[getattr(wire, kind)] = [getattr(wire, name)(*of) for name, *of in messages]
+    device = Device(port, clock, lambda *chunk: written.append(chunk))
+    method, *values = ask
+    try:
+        came = getattr(device, method)(*(ALWAYS if one == "stop" else one for one in values))
+        came = [fault.code for fault in came.faults] if isinstance(came, Drop) else str(came)
+    except DeviceError as error:
+        came = error.message
+    talk = [(spoken(data), ns // 10**6) for way, ns, data in written if way == "tx"]
+    groups = [(name, [ms for _, ms in of]) for name, of in groupby(talk, lambda one: one[0])]
+    assert [[name, len(ms), ms[0], ms[-1]] for name, ms in groups] == said
+    assert (came, [*device.statistics().values()]) == (told, counted)
 
 
 class Captive(FakePort):
@@ -101,37 +121,6 @@ class Captive(FakePort):
 
 def test_a_boot_loader_is_left_in_peace_until_it_lets_go(clock):
     assert Device(Captive(clock, {}), clock).connect() == IDENTITY
-
-
-@pytest.mark.parametrize(("tries", "asked"), [(40, 4), (4, 4), (2, 2)])
-def test_who_never_answers_is_asked_a_few_times_whatever_patience_a_bad_line_needs(
-    clock, tries, asked
-):
-    """Each time: at first, behind what a boot loader is told, and when it should have let go."""
-    port = FakePort(clock, {})
-    one = Device(port, clock, tries=tries)
-    assert "cable" in refused(DeviceTimeoutError, "did not answer Identify", one.connect).hint
-    frames = [frame for data in port.written for frame in Decoder().feed(data)]
-    assert [frame.type for frame in frames] == [wire.CODES[wire.Identify]] * 3 * asked
-
-
-def test_repeats_have_the_same_seq_and_back_off(clock):
-    port = FakePort(clock, {})
-    refused(DeviceTimeoutError, "did not answer Ping", Device(port, clock, tries=6).ping)
-    assert len(port.written) == 6
-    assert len(set(port.written)) == 1
-    assert 1.5 < clock.now_ns() * 1e-9 < 3
-
-
-def test_what_is_asked_and_asked_again_is_counted(clock):
-    port = FakePort(clock, {wire.Ping: [wire.Pong(1)]})
-    one = Device(port, clock, tries=3)
-    one.ping()
-    refused(DeviceTimeoutError, "", one.status)
-    counted = one.statistics()
-    assert (counted["requests"], counted["repeats"]) == (2, 2)
-    assert counted["tx_bytes"] == sum(map(len, port.written))
-    assert counted["rx_bytes"] == len(encode(Frame(wire.CODES[wire.Pong], 1, 1, bytes(4))))
 
 
 @pytest.mark.parametrize(
@@ -162,11 +151,6 @@ def test_seq_wraps_around_zero(clock):
     for _ in range(300):
         one.ping()
     assert [frame.seq for frame in port.frames] == [n % 254 + 1 for n in range(300)]
-
-
-def test_nonsense_is_said_to_be_nonsense(clock):
-    port = FakePort(clock, {wire.Status: [wire.Pong(1)]})
-    refused(DeviceError, "answered Status with Pong", Device(port, clock).status)
 
 
 @pytest.mark.parametrize("ask", [Device.status, Device.receive, Device.statistics])
@@ -217,13 +201,6 @@ class Liar(FakePort):
         return super().write(data)
 
 
-def test_events_that_do_not_match_the_certificate_are_a_fault(clock):
-    port = Liar(clock, 1, events_frame(0, (150, 1)))
-    drop = Device(port, clock).fetch(1)
-    assert len(port.written) == 3  # certificate, events, events once more
-    assert make_reason("crc_mismatch") in drop.faults
-
-
 @pytest.mark.parametrize(
     ("held", "answers", "error", "said", "asked"),
     [
@@ -257,26 +234,6 @@ def test_a_device_that_disarmed_itself_has_a_reason(clock, reason):
     port.answers[wire.Arm] = [wire.Armed(10)]
     token = one.arm(wire.Arm(1, 1, 0, 0, 1, 1))
     refused(DeviceRefusedError, "is not armed", one.fire, token)
-
-
-def test_a_recording_without_end_is_a_time_out(clock):
-    port = FakePort(clock, {wire.Status: [wire.State(wire.Phase.RECORDING, 0, 1, 3)]})
-    refused(DeviceTimeoutError, "never ends", Device(port, clock).collect, 1, timeout=10)
-    assert clock.now_ns() * 1e-9 == pytest.approx(LONGEST_RECORD_MS * 1e-3 + 10, abs=0.5)
-    each_s = LONGEST_RECORD_MS * 1e-3 / len(port.written)
-    assert 0.25 <= each_s < 0.4, "it is asked now and then, and not all the time"
-
-
-def test_after_an_abort_the_certificate_is_asked_for_soon(clock):
-    answers = {
-        wire.Abort: [wire.Done()],
-        wire.Status: [wire.State(wire.Phase.HOLDING, 0, 1, 0)],
-        wire.Read: [certificate(1, 0)],
-    }
-    port = FakePort(clock, answers)
-    drop = Device(port, clock).collect(1, timeout=60, stop=lambda: True)
-    assert drop.certificate.events == 0
-    assert 0.25 <= clock.now_ns() * 1e-9 < 0.4
 
 
 # -- the transcript alone

@@ -151,18 +151,6 @@ def refuse(path, statement):
         assert list(connection.iterdump()) == before
 
 
-def test_a_refused_record_leaves_the_others(path):
-    with make(path) as session:
-        session.add_drop(DEVICE_DROP)
-        refused(SessionError, "never altered", session.add_drop, DEVICE_DROP)
-        half_bad = Drop(run=7, attempt=1, tick_hz=1, edges=(Edge(1, 1, True), Edge(2**70, 1, True)))
-        refused(SessionError, "refuses", session.add_drop, half_bad)
-        session.add_drop(IMPORTED)
-        session.commit()
-    with Session.open(path, readonly=True) as session:
-        assert list(session.drops()) == [DEVICE_DROP, IMPORTED]
-
-
 def fill_disk(session):
     """Let the file grow no further; give its connection, by which it may again."""
     connection = session.connection
@@ -171,22 +159,6 @@ def fill_disk(session):
     error = refused(SessionError, "disk is full", session.log_bytes, "rx", 1, bytes(100_000))
     assert "free some space" in error.hint
     return connection
-
-
-def test_a_full_disk_costs_nothing_once_there_is_room(path):
-    with make(path) as session:
-        session.log_bytes("rx", 0, b"first")
-        session.commit()
-        connection = fill_disk(session)
-        session.log_bytes("rx", 2, b"kept in memory")
-        session.add_drop(DEVICE_DROP)
-        session.add_drop(IMPORTED)
-        refused(SessionError, "disk is full", session.commit)
-        assert session.pending == 4
-        connection.execute("PRAGMA max_page_count = 100000")
-    with Session.open(path) as session:
-        assert [chunk.host_ns for chunk in session.byte_log()] == [0, 1, 2]
-        assert list(session.drops()) == [DEVICE_DROP, IMPORTED]
 
 
 def test_what_waits_for_the_disk_is_saved_elsewhere_when_the_file_is_lost(path):
@@ -199,26 +171,9 @@ def test_what_waits_for_the_disk_is_saved_elsewhere_when_the_file_is_lost(path):
         assert list(session.drops()) == [IMPORTED]
 
 
-def test_a_record_that_waits_for_the_disk_and_is_refused_then_is_told_of(path):
-    with make(path) as session:
-        session.add_drop(DEVICE_DROP)
-        session.commit()
-        connection = fill_disk(session)
-        session.add_drop(DEVICE_DROP)  # which is there
-        session.add_drop(IMPORTED)
-        connection.execute("PRAGMA max_page_count = 100000")
-        refused(SessionError, "never altered", session.commit)
-    with Session.open(path) as session:
-        assert list(session.drops()) == [DEVICE_DROP, IMPORTED]
-
-
-def test_readers_beside_a_writer_see_what_is_committed(path):
+def test_who_only_reads_cannot_write(path):
     make(path).close()
-    with Session.open(path, readonly=True) as reader, Session.open(path) as writer:
-        writer.log_bytes("rx", 1, b"x")
-        assert list(reader.byte_log()) == []
-        writer.commit()
-        assert len(list(reader.byte_log())) == 1
+    with Session.open(path, readonly=True) as reader:
         refused(SessionError, "read-only", reader.log_bytes, "rx", 1, b"x")
         refused(SessionError, "read-only", reader.commit)
 
@@ -285,16 +240,6 @@ for count in range(10**9):
         stamps = [chunk.host_ns for chunk in session.byte_log()]
     # The row after the last announced one may have been committed before the kill.
     assert stamps in (list(range(last + 1)), list(range(last + 2)))
-    assert check_chain(examine(path).rows.tables) == []
-
-
-def test_sigkill_before_the_commit_leaves_a_whole_session(path):
-    code = 'session.log_bytes("rx", 1, b"x"); print("ready", flush=True); sys.stdin.read()'
-    with killed(code, path) as child:
-        assert child.stdout.readline() == "ready\n"
-    with Session.open(path) as session:
-        assert list(session.byte_log()) == []
-        session.log_bytes("rx", 1, b"goes on")
     assert check_chain(examine(path).rows.tables) == []
 
 
@@ -384,12 +329,11 @@ def test_what_is_as_recorded_has_no_fault(sound, tmp_path):
 
 
 @cases
-def test_what_is_not_as_recorded_is_named(sql, fault, sound, tmp_path):
+def test_what_is_not_as_recorded_is_named(sql, damage, sound, tmp_path):
     path = tmp_path / "altered"
     shutil.copy(sound, path)
     alter(path, *sql.split("; "))
-    damage = examine(path).damage
-    assert any(line.startswith("table " + fault) for line in damage), damage
+    assert examine(path).damage == damage
 
 
 def test_an_old_file_has_no_chain_and_a_continued_one_says_since_when(path, filled):
