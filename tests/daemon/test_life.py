@@ -1,13 +1,19 @@
-"""All that clients are told of the life of sessions, answer by answer and change by change."""
+"""The life of sessions as clients have it: each answer, each change, and what stays in the file."""
 
 import json
+import threading
 
 from bench.process_fixture import FENCE
+from rig.daemon.connecting import connect
 from rig.daemon.service import METHODS
 from rig.daemon.worker import Worker
-from rig.reasons import rig_error
+from rig.errors import DeviceError, SessionError, StoppedError
+from rig.reasons import plain_reason, rig_error
+from rig.recorder.interrupts import Interrupts
 from rig.recorder.published import PublishedState
+from rig.session.schema import RunState
 from tests.daemon.rig_in_a_box import CHANGES, Box, Trouble
+from tests.refusals import refused
 from tests.tables import read_table
 
 LEFT_OUT = {"created", "hint", "reason_codes"}
@@ -77,3 +83,31 @@ def test_each_deed_has_its_answer_its_changes_and_its_lines_of_the_log(
         said = [line.replace(f"{tmp_path}/", "") for line in caplog.messages]
         assert came + said == told, (deed, values)
     rig.kill()
+
+
+def test_a_client_finds_in_the_file_what_it_has_asked_for(tmp_path, monkeypatch):
+    """Of a worker of its own, where no daemon is."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+    protocol = tmp_path / "fence.yaml"
+    protocol.write_text(FENCE.replace("RUNS", "2"), "utf-8")
+    client = connect("sim://", print, Interrupts())
+    assert client.open_session(str(protocol), str(tmp_path / "session"), 3) is None
+    session = client.session
+    client.wait(2.0)
+    assert 4 <= len(session.pings()) <= 12
+    token = client.arm(1, 1)
+    client.stop("enough")
+    refused(StoppedError, "enough", client.fire, token)
+    client.fire(client.arm(1, 2))
+    assert client.collect(1, 2) == session.drop(1, 2) == next(session.drops())
+    client.log_state(1, 2, RunState.VOID, (plain_reason("skew"),))
+    refused(DeviceError, "there is no record of run 2, attempt 1", client.collect, 2, 1)
+    log = [(entry.attempt, str(entry.state)) for entry in session.states()]
+    course = ["armed", "interrupted"], ["armed", "fired", "recorded", "void"]
+    assert log == [(n, state) for n, states in enumerate(course, 1) for state in states]
+    assert session.states()[-1].reasons == (plain_reason("skew"),)
+    client.close_session()
+    refused(SessionError, "no session is open", getattr, client, "session")
+    refused(SessionError, "closed", session.pings)
+    client.close()
+    assert "rig worker" not in {thread.name for thread in threading.enumerate()}

@@ -103,6 +103,40 @@ def test_who_is_no_daemon_is_told_so(tmp_path, told, why):
         refused(errors.DeviceError, why, client.result)
 
 
+def test_a_line_gives_each_request_its_answer_and_all_that_is_open_one_end(tmp_path):
+    """Answers in any order, to nobody and to who waits no more; nothing stays of it at the end."""
+    tmp_path.chmod(0o700)
+    told, now, place = [], {"n": 1, "state": {}}, tmp_path / "rig.sock"
+    with socket.socket(socket.AF_UNIX) as other, ThreadPoolExecutor(1) as pool:
+        other.bind(str(place))
+        other.listen()
+        note = lambda *what: told.append(what)  # noqa: E731
+        client = pool.submit(Line, place, "t", note, note)
+        near, _ = other.accept()
+        with near, near.makefile("rb") as lines:
+            hello = {"jsonrpc": "2.0", "method": "hello", "params": {"api": 1, "client": "t"}}
+            assert json.loads(lines.readline()) == hello | {"id": 1}
+            near.sendall(rpc.answer(1, {"pid": 7}))
+            line = client.result(PATIENCE_S)
+            assert line.daemon == {"pid": 7}
+            first, left, second, unanswered = (line.ask("stop", reason="r") for _ in range(4))
+            numbers = [json.loads(lines.readline())["id"] for _ in range(4)]
+            assert numbers == [2, 3, 4, 5]
+            left.cancel()
+            answers = rpc.answer(4, now), rpc.answer(99, {}), rpc.answer(3, {})
+            change, no = rpc.request("change", {"n": 2}, None), rpc.failure(2, ERRORS[0])
+            near.sendall(b"".join((*answers, change, no)))
+            refused(DeviceRefusedError, "gates 0, 2 are blocked", first.result, PATIENCE_S)
+            assert (second.result(0.0), told) == (now, [("snapshot", now), ("change", {"n": 2})])
+            near.shutdown(socket.SHUT_WR)
+            assert lines.read() == b"", "it hangs up too"
+            for answer in (unanswered, line.ask("renew")):
+                refused(errors.DeviceError, "it hung up", answer.result, PATIENCE_S)
+            line.close()
+    assert told[2:] == [()]
+    assert "rig client" not in {thread.name for thread in threading.enumerate()}
+
+
 def test_one_client_has_control_until_it_is_not_heard():
     time = SimpleNamespace(now=0.0)
     lease = Lease(lambda: time.now)

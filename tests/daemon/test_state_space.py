@@ -267,6 +267,19 @@ def test_what_the_board_holds_otherwise_than_the_session_is_not_forgotten(box):
     assert box.phase is Phase.HOLDING
 
 
+def test_a_stop_after_a_release_that_was_not_answered_keeps_what_fell(box):
+    def silent(_):
+        box.deaf_until_ns = box.clock.now_ns() + 200_000_000
+        box.trouble = Trouble("stopped", "write")  # FIRE once more
+
+    box.arm()
+    box.silent, box.trouble = silent, Trouble("silent", "written", 2)
+    assert isinstance(box.fire_latest(), StoppedError)
+    assert not box.board.outputs()
+    box.passed(6.0)
+    assert box.on_disk("state", (1, 1)) == ["armed", "fired", "recorded"]
+
+
 def test_stop_answers_what_waits(box):
     box.trouble = Trouble("stopped", "written")  # ARM
     assert isinstance(box.arm(), StoppedError)

@@ -149,11 +149,6 @@ def test_what_does_not_fit_is_refused(kind, values):
     refused(wire.MessageError, "", wire.pack, getattr(wire, kind)(*values))
 
 
-def test_values_without_a_name_are_refused():
-    refused(wire.MessageError, "RefusalReason", wire.unpack, 0x86, b"\xff\0\0")
-    refused(wire.MessageError, "0x42", wire.unpack, 0x42, b"")
-
-
 @given(st.integers(0, 0xFFFF), st.integers(1, 0xFFFF))
 def test_labels(run, attempt):
     label = wire.pack_label(run, attempt)

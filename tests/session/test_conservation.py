@@ -105,18 +105,13 @@ class Conservation(RuleBasedStateMachine):
     def state(self, ns, state):
         self.add((7, 1, state, ns, ()), self.session.add_state, 7, 1, state, ns)
 
-    @rule()
-    def fill(self):
-        (pages,) = self.session.connection.execute("PRAGMA page_count").fetchone()
-        self.limit(pages)
-
-    @rule()
-    def make_room(self):
-        self.limit(1 << 30)
-
-    def limit(self, pages):
-        self.is_full = pages < 1 << 30
-        self.session.connection.execute(f"PRAGMA max_page_count = {pages}")
+    @rule(is_full=st.booleans())
+    def limit(self, is_full):
+        """Let the file grow no further, or as far as it likes."""
+        pages = self.session.connection.execute("PRAGMA page_count").fetchone()[0]
+        most = pages if is_full else 1 << 30
+        self.session.connection.execute(f"PRAGMA max_page_count = {most}")
+        self.is_full = is_full
 
     @rule()
     def commit(self):
@@ -139,8 +134,8 @@ class Conservation(RuleBasedStateMachine):
     @rule()
     def go_on(self):
         """Close the file and open it again."""
-        self.make_room()
-        with suppress(SessionError):
+        self.limit(is_full=False)
+        with suppress(SessionError):  # of what is refused
             self.session.close()
         self.settled()
         self.session = Session.open(self.path)
