@@ -63,7 +63,8 @@ class Told(Box):
         else:
             names = {"protocol", "session"} & values.keys()
             files = {name: str(self.folder / values[name]) for name in names}
-            answer = self.asked(METHODS[deed].bind(values | files))
+            method = METHODS[deed]
+            answer = self.asked(method.bind(values | files), writes=method.writes)
         told = str(answer) if isinstance(answer, Exception) else ""
         text = json.dumps([answer if isinstance(answer, dict) else told, *self.changes]).replace(
             f"{self.folder}/", ""

@@ -161,13 +161,6 @@ def test_impossible_labels(pair):
     refused(ValueError, "65535", wire.pack_label, *pair)
 
 
-def test_a_flicker_of_some_gate_is_told_without_a_number():
-    assert (
-        DeviceRefusedError(wire.RefusalReason.GATE_UNSTEADY, 0).message
-        == "a gate changed after arming"
-    )
-
-
 @pytest.mark.parametrize("reason", wire.RefusalReason)
 def test_every_refusal_has_advice(reason):
     error = DeviceRefusedError(reason, 0x0005)
