@@ -45,7 +45,7 @@ def working(processes: ProcessFixture) -> Iterator[tuple[Worker, Callable[..., A
     worker.start()
 
     def ask(work: Callable[..., Any]) -> Any:
-        return worker.submit(work, "me").result(PATIENCE_S)
+        return worker.submit(work, "me", writes=True).result(PATIENCE_S)
 
     try:
         files = str(processes.protocol), str(processes.session)

@@ -2,6 +2,7 @@
 
 import json
 import threading
+from zlib import crc32
 
 from bench.process_fixture import FENCE
 from rig.daemon.connecting import connect
@@ -12,6 +13,7 @@ from rig.reasons import plain_reason, rig_error
 from rig.recorder.interrupts import Interrupts
 from rig.recorder.published import PublishedState
 from rig.session.schema import RunState
+from rig.session.store import Session
 from tests.daemon.rig_in_a_box import CHANGES, Box, Trouble
 from tests.refusals import refused
 from tests.tables import read_table
@@ -50,6 +52,13 @@ class Told(Box):
     def unplug(self, absent):
         self.is_absent = absent
         self.pull()
+
+    def kept(self, name):
+        """Count what a session file holds, and give the CRC-32 of all bytes with their times."""
+        with Session.open(self.folder / name, readonly=True) as session:
+            kept = [*session.byte_log()], session.pings(), session.states(), [*session.drops()]
+            counts = [len(session.identities()), *map(len, kept)]
+        return {"rows": counts, "crc": crc32(repr(kept[:2]).encode())}
 
     def goes_wrong(self, *trouble):
         self.trouble = Trouble(*trouble)

@@ -14,9 +14,11 @@ def test_a_fault_of_the_program_is_logged_with_its_traceback_once(caplog):
     worker = Worker("sim://", PublishedState(), lease)
     worker.start()
     try:
-        refused(RigError, "internal error", worker.submit(lambda _: 1 / 0, "me").result, PATIENCE_S)
+        divided = worker.submit(lambda _: 1 / 0, "me", writes=False)
+        refused(RigError, "internal error", divided.result, PATIENCE_S)
     finally:
         worker.end()
         worker.join()
     assert [record.exc_info[0] for record in caplog.records] == [ZeroDivisionError]
     assert worker.published.get("error") is None, "no scene, so there is nothing to come back to"
+    assert worker.published.get("link")["state"] == "closed"

@@ -308,7 +308,7 @@ async def test_a_part_that_dies_ends_the_daemon_and_says_so(door, monkeypatch, c
 async def test_a_worker_that_dies_ends_the_daemon(door, monkeypatch, caplog):
     monkeypatch.setattr(door.server._worker, "_attend", Mock(side_effect=SystemError))
     door.server._worker.wake()
-    waiting = door.server._worker.submit(lambda _: None, None)
+    waiting = door.server._worker.submit(lambda _: None, None, writes=False)
     with pytest.raises(SystemError):
         await door.server.serving
     assert "internal error" in str(waiting.exception(PATIENCE_S))

@@ -14,7 +14,6 @@ from unittest.mock import Mock
 
 import pytest
 
-from rig.daemon.worker import STALL_S
 from rig.errors import ControlError, SessionError, StoppedError
 from rig.link.messages import TEST_RUN, Phase, RefusalReason, pack_label
 from rig.recorder.controller import Controller
@@ -115,10 +114,10 @@ def test_nothing_falls_unarmed_is_lost_or_waits_for_ever(folder, monkeypatch):
     assert any(path[-1:] == (("accept", None),) for path in found.values())
 
 
-def seen_at_answer(box, work, look, **options):
+def seen_at_answer(box, work, look, *, writes=True):
     """Have a client ask for work; its outcome, and what there is to see when that is known."""
     seen = []
-    outcome = box.worker.submit(work, "A", **options)
+    outcome = box.worker.submit(work, "A", writes=writes)
     outcome.add_done_callback(lambda _: seen.append(look()))
     box.turned()
     return outcome, *seen
@@ -130,14 +129,7 @@ def box(tmp_path, monkeypatch):
         yield box
 
 
-def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(box):
-    box.arm()
-    assert box.worker.published.get("phase") == "armed"
-    line = box.line
-    box.worker.controller.close()
-    assert (box.phase, line.is_open) == (Phase.IDLE, False)
-    box.kill()
-    box.resume()
+def test_whoever_looks_on_leaves_a_drop_on_the_board(box):
     box.arm()
     box.trouble = Trouble("killed", "written", 2)  # FIRE, behind the look at what it does
     box.fire_latest()
@@ -155,7 +147,7 @@ def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(box):
 def test_whoever_leaves_once_it_is_let_go_has_it_recorded_whole(box):
     token = box.arm()
     box.wanted = box.tokens[token]
-    box.worker.submit(lambda c: c.fire(token), "A")
+    box.worker.submit(lambda c: c.fire(token), "A", writes=True)
     box.worker._do(box.worker._jobs.get_nowait())
     box.lease.release("A")
     box.turned()
@@ -232,13 +224,42 @@ def test_who_is_held_up_says_by_what_and_whether_anything_is_armed(box, monkeypa
             trouble = worker.stall()
         return trouble and trouble.reasons[0].code
 
-    assert [stalled(2.0 * STALL_S, disk_s) for disk_s in (0.0, 1.0)] == ["held_up", "disk_slow"]
-    assert [stalled(0.5 * STALL_S, disk_s) for disk_s in (0.0, 1.0)] == [None, None]
+    assert [stalled(1.01, disk_s) for disk_s in (0.0, 1.0)] == ["held_up", "disk_slow"]
+    assert [stalled(0.99, disk_s) for disk_s in (0.0, 1.0)] == [None, None]
     box.arm()
-    armed = [stalled(2.0 * STALL_S, disk_s) for disk_s in (0.0, 1.0)]
+    armed = [stalled(1.01, disk_s) for disk_s in (0.0, 1.0)]
     assert armed == ["held_up_armed", "disk_slow_armed"]
     box.turned()
-    assert box.asked(lambda _: box.clock.sleep(1.5 * STALL_S) or worker.stall()) is not None
+    assert box.asked(lambda _: box.clock.sleep(1.01) or worker.stall()) is not None
+    assert box.asked(lambda c: c.wait(1.9) or worker.stall()) is None, "while it goes on"
+    worker.controller.close()
+    assert [stalled(1.01, disk_s) for disk_s in (0.0, 1.0)] == [None, "disk_slow"]
+
+
+def test_how_long_the_disk_is_at_a_write_is_known_while_it_is(box):
+    seen = []
+    box.looked = lambda _: seen.append(box.worker.disk_s())
+    box.trouble = Trouble("looked", "commit")
+    box.asked(lambda c: c.wait(0.1))
+    assert seen[0] > 0.0 == box.worker.disk_s()
+    box.worker.controller.close()
+    assert box.worker.disk_s() == 0.0
+
+
+def test_a_worker_that_ends_disarms_and_answers_whatever_waits(box):
+    def ask(_=None):
+        asked.append(worker.submit(lambda _: None, "A", writes=False))
+
+    box.arm()
+    worker, asked = box.worker, []
+    ask()
+    box.asking, box.trouble = ask, Trouble("asking", "write")  # ABORT
+    worker.end()
+    worker._run()
+    said = [str(answer.exception(0.0)).partition("\n")[0] for answer in asked]
+    assert said == ["the daemon ended", "the daemon ends"]
+    assert (box.phase, worker.over.result(0.0)) == (Phase.IDLE, None)
+    assert box.on_disk("state", (1, 1)) == ["armed", "interrupted"]
 
 
 def test_what_fails_is_in_the_state_before_it_is_answered(box):
@@ -278,14 +299,6 @@ def test_a_stop_after_a_release_that_was_not_answered_keeps_what_fell(box):
     assert not box.board.outputs()
     box.passed(6.0)
     assert box.on_disk("state", (1, 1)) == ["armed", "fired", "recorded"]
-
-
-def test_stop_answers_what_waits(box):
-    box.trouble = Trouble("stopped", "written")  # ARM
-    assert isinstance(box.arm(), StoppedError)
-    waiting = [box.worker.submit(lambda c: c.opened, "A") for _ in range(2)]
-    box.stop()
-    assert all(isinstance(one.exception(timeout=0.0), StoppedError) for one in waiting)
 
 
 def test_a_session_that_is_opened_ends_the_trouble_of_the_one_before(box):
