@@ -19,6 +19,7 @@ from rig.daemon.client import AsyncClient, Line
 from rig.daemon.listener import Door
 from rig.daemon.socket_path import default_socket, peer_uid, prepare_folder
 from rig.errors import BusyError, ControlError, DeviceError, InputError, RigError, VersionError
+from rig.reasons import rig_error
 from tests.daemon.test_api_page import rows
 from tests.refusals import refused
 from tests.tables import cases
@@ -284,7 +285,7 @@ async def test_whatever_a_client_is_called_all_see_it(door, caplog):
             await asyncio.sleep(0)
         shown = watcher.replica.state["control"]["client"]
         assert shown.isprintable()
-        assert 0 < len(shown) <= 80
+        assert len(shown) == min(len(name), 80)
         with pytest.raises(ControlError):
             await watcher.call("wait", seconds=0.0)
         assert await client.call("stop", reason=name) == {}
@@ -312,6 +313,27 @@ async def test_a_worker_that_dies_ends_the_daemon(door, monkeypatch, caplog):
     with pytest.raises(SystemError):
         await door.server.serving
     assert "internal error" in str(waiting.exception(PATIENCE_S))
+
+
+async def test_who_is_held_up_is_shown_to_be_until_it_goes_on(door, monkeypatch, caplog):
+    published, held_up = door.server.published, rig_error("held_up", late_s=2.0)
+
+    async def shown(message):
+        async with asyncio.timeout(PATIENCE_S):
+            while (published.get("error") or {}).get("message") != message:
+                await asyncio.sleep(0)
+
+    stall = Mock(return_value=held_up)
+    monkeypatch.setattr(door.server._worker, "stall", stall)
+    await shown(held_up.message)
+    stall.reset_mock(return_value=True)
+    stall.return_value = None
+    await shown(None)
+    published.set(error={"message": "the worker's own"})
+    while stall.call_count < 3:
+        await asyncio.sleep(0)
+    await shown("the worker's own")
+    assert caplog.messages == [f"{held_up.message} ({held_up.hint})"]
 
 
 async def test_a_stop_is_read_behind_any_number_of_requests(door, monkeypatch):

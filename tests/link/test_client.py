@@ -26,7 +26,7 @@ from tests.daemon.far_port import FarPort
 from tests.flash.pty_board import PtyBoard
 from tests.link.bench import LABEL, ScriptedLab, falling_rods
 from tests.link.strategies import MESSAGES
-from tests.link.talk import arm, connected, framed
+from tests.link.talk import IDENTITY, arm, connected, framed
 from tests.refusals import refused
 from tests.tables import cases
 from tests.waiting import until
@@ -69,11 +69,6 @@ class FakePort:
 @pytest.fixture
 def clock() -> VirtualClock:
     return VirtualClock()
-
-
-IDENTITY = wire.Identity(
-    2, "mega2560", "1.0", bytes(8), 16_000_000, 16, 2, 500_000, 1024, 0, 256, ""
-)
 
 
 def spoken(data: bytes) -> str:
@@ -199,6 +194,17 @@ class Liar(FakePort):
         count = wire.unpack(frame.type, frame.payload).count
         self.answers[wire.Read] = self.events if count else [certificate(1, self.held, 77)]
         return super().write(data)
+
+
+def test_events_that_do_not_match_their_certificate_are_read_once_more(clock):
+    """As far as the device keeps them."""
+    port = Liar(clock, 3, events_frame(0, (150, 1), (160, 0), (170, 1)))
+    device = Device(port, clock)
+    device.transcript.feed("rx", 0, framed(replace(IDENTITY, capacity=2)))
+    drop = device.fetch(1)
+    asked = [wire.unpack(frame.type, frame.payload) for frame in port.frames]
+    assert [(read.first, read.count) for read in asked] == [(0, 0), (0, 3), (1, 2)]
+    assert (len(drop.edges), drop.faults) == (3, (make_reason("crc_mismatch"),))
 
 
 @pytest.mark.parametrize(

@@ -12,13 +12,14 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, pr
 
 from rig.errors import SessionError
 from rig.records import ClockSample, Drop, Edge, HostBreak, Pulse
+from rig.session.reading import ByteChunk, StateEntry
 from rig.session.schema import TABLES, RunState
 from rig.session.store import Session
 from tests.examples import examples
+from tests.link.strategies import LONG, WORD
 
 INT64 = st.integers(-(2**63), 2**63 - 1)
 NS = st.integers(-(2**62) + 1, 2**62 - 1)
-WORD, LONG = st.integers(0, 2**16 - 1), st.integers(0, 2**32 - 1)
 EDGES = st.lists(st.builds(Edge, INT64, st.integers(0, 15), st.booleans()), min_size=1, max_size=5)
 TIMINGS = (
     st.builds(ClockSample, NS, NS, LONG)
@@ -26,6 +27,7 @@ TIMINGS = (
     | st.builds(HostBreak, NS, NS, NS)
 )
 MEMORY = Path("/dev/shm")
+KINDS = ClockSample, Pulse, HostBreak, Drop, ByteChunk, StateEntry
 
 
 def links(path):
@@ -60,15 +62,13 @@ class Conservation(RuleBasedStateMachine):
         self.session = Session.create(self.path, "p", "p", simulated=True, origin="")
         self.reader = Session.open(self.path, readonly=True)
         self.kept, self.waiting, self.runs = [], [], 0
-        self.is_full = self.has_failed = (
-            False  # room, and the transaction, which waits for a commit
-        )
+        self.is_full = self.has_failed = False  # the disk; what is added, until it is committed
 
-    def add(self, record, add, *values, is_refused=False, **more):
+    def add(self, record, add, *values, is_refused=False):
         """Add a record; one that is refused is gone, one for which the disk has no room waits."""
         said = ""
         try:
-            add(*values, **more)
+            add(*values)
         except SessionError as error:
             said = str(error)
         has_failed = "disk is full" in said
@@ -81,8 +81,8 @@ class Conservation(RuleBasedStateMachine):
 
     @rule(ns=NS, direction=st.sampled_from(["rx", "tx"]), size=st.sampled_from([0, 1, 9000]))
     def bytes(self, ns, direction, size):
-        chunk = ns, direction, b"\xff" * size
-        self.add(chunk, self.session.log_bytes, direction, ns, chunk[2])
+        chunk = ByteChunk(ns, direction, b"\xff" * size)
+        self.add(chunk, self.session.log_bytes, direction, ns, chunk.data)
 
     @rule(record=TIMINGS)
     def timing(self, record):
@@ -103,7 +103,8 @@ class Conservation(RuleBasedStateMachine):
 
     @rule(ns=NS, state=st.sampled_from(RunState))
     def state(self, ns, state):
-        self.add((7, 1, state, ns, ()), self.session.add_state, 7, 1, state, ns)
+        entry = StateEntry(7, 1, state, ns, ())
+        self.add(entry, self.session.add_state, 7, 1, state, ns)
 
     @rule(is_full=st.booleans())
     def limit(self, is_full):
@@ -142,16 +143,11 @@ class Conservation(RuleBasedStateMachine):
 
     @invariant()
     def only_what_is_committed_is_there(self):
-        assert self.session.pending == len(self.waiting)
-        reader, by_kind = self.reader, {}
-        for record in self.kept:
-            by_kind.setdefault(type(record), []).append(record)
-        assert reader.pings() == by_kind.get(ClockSample, [])
-        assert reader.pulses() == by_kind.get(Pulse, [])
-        assert reader.host_breaks() == by_kind.get(HostBreak, [])
-        assert [*reader.drops()] == by_kind.get(Drop, [])
-        others = [*map(tuple, reader.byte_log()), *map(tuple, reader.states())]
-        assert others == sorted(by_kind.get(tuple, []), key=len)
+        reader = self.reader
+        drops, chunks = [*reader.drops()], [*reader.byte_log()]
+        timings = reader.pings(), reader.pulses(), reader.host_breaks()
+        kept = [[record for record in self.kept if type(record) is kind] for kind in KINDS]
+        assert [*timings, drops, chunks, reader.states()] == kept
 
     def teardown(self):
         with self.folder:
