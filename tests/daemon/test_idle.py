@@ -2,11 +2,8 @@
 
 import asyncio
 
-from bench.process_fixture import ProcessFixture
 from rig.daemon import server
 from rig.daemon.server import Server
-from tests.cli.lab import log_of
-from tests.daemon.at_work import ended
 from tests.tables import cases
 from tests.waiting import PATIENCE_S
 
@@ -27,16 +24,3 @@ async def test_it_stays_while_anything_of_this_is_shown(tmp_path, monkeypatch, c
     alone.published.set(clients=0, drop={"state": "recorded"}, error=None, phase="idle")
     await asyncio.wait_for(serving, PATIENCE_S)
     assert caplog.messages[-1] == "no client for 0 s; nothing armed, falling or unsaved"
-
-
-def test_a_drop_that_only_the_board_has_is_waited_for():
-    with ProcessFixture(runs=2, seed=3) as processes:
-        processes.start_daemon("--idle-timeout", "0.4")
-        driver = processes.client("the driver")
-        driver.take_control()
-        driver.open_session(processes.protocol, processes.session)
-        driver.fire(driver.arm(1, 1))
-        processes.hand("pull 2")
-        driver.close()
-        ended(processes)
-        assert log_of(processes.session) == {1: [(1, "armed"), (1, "fired"), (1, "recorded")]}

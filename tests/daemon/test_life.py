@@ -2,6 +2,7 @@
 
 import json
 import threading
+from dataclasses import replace
 from zlib import crc32
 
 from bench.process_fixture import FENCE
@@ -60,6 +61,11 @@ class Told(Box):
             counts = [len(session.identities()), *map(len, kept)]
         return {"rows": counts, "crc": crc32(repr(kept[:2]).encode())}
 
+    def swap(self, number):
+        """Have another board at the port."""
+        self.board.identity = replace(self.board.identity, unique_id=bytes([number]) * 8)
+        self.pull()
+
     def goes_wrong(self, *trouble):
         self.trouble = Trouble(*trouble)
 
@@ -112,9 +118,8 @@ def test_a_client_finds_in_the_file_what_it_has_asked_for(tmp_path, monkeypatch)
     assert client.collect(1, 2) == session.drop(1, 2) == next(session.drops())
     client.log_state(1, 2, RunState.VOID, (plain_reason("skew"),))
     refused(DeviceError, "there is no record of run 2, attempt 1", client.collect, 2, 1)
-    log = [(entry.attempt, str(entry.state)) for entry in session.states()]
-    course = ["armed", "interrupted"], ["armed", "fired", "recorded", "void"]
-    assert log == [(n, state) for n, states in enumerate(course, 1) for state in states]
+    course = ["armed", "interrupted", "armed", "fired", "recorded", "void"]
+    assert [entry.state for entry in session.states()] == course
     assert session.states()[-1].reasons == (plain_reason("skew"),)
     client.close_session()
     refused(SessionError, "no session is open", getattr, client, "session")

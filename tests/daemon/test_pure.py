@@ -29,7 +29,7 @@ from rig.link.transcript import Incoming
 from rig.reasons import rig_error
 from rig.recorder.feed import StateFeed
 from rig.recorder.interrupts import Interrupts
-from rig.recorder.published import EDGES_LIMIT, PublishedState
+from rig.recorder.published import PublishedState
 from rig.recorder.recorder import NullSink
 from rig.records import Job
 from rig.session.schema import RunState
@@ -120,8 +120,7 @@ def test_a_line_gives_each_request_its_answer_and_all_that_is_open_one_end(tmp_p
             line = client.result(PATIENCE_S)
             assert line.daemon == {"pid": 7}
             first, left, second, unanswered = (line.ask("stop", reason="r") for _ in range(4))
-            numbers = [json.loads(lines.readline())["id"] for _ in range(4)]
-            assert numbers == [2, 3, 4, 5]
+            assert [json.loads(lines.readline())["id"] for _ in range(4)] == [2, 3, 4, 5]
             left.cancel()
             answers = rpc.answer(4, now), rpc.answer(99, {}), rpc.answer(3, {})
             change, no = rpc.request("change", {"n": 2}, None), rpc.failure(2, ERRORS[0])
@@ -212,9 +211,9 @@ def test_a_change_that_changes_nothing_is_none():
 
 def test_the_edges_of_an_endless_drop_do_not_fill_the_memory():
     published = PublishedState()
-    for first in range(0, 2 * EDGES_LIMIT, 1 << 12):
+    for first in range(0, 1 << 17, 1 << 12):
         published.edges((tick, 0, 1) for tick in range(first, first + (1 << 12)))
-    assert len(published.snapshot()["state"]["edges"]) == EDGES_LIMIT
+    assert len(published.snapshot()["state"]["edges"]) == 1 << 16
 
 
 def test_a_replica_does_not_swallow_a_gap():

@@ -195,10 +195,12 @@ def test_a_test_of_the_release_that_is_not_whole_is_shown(box):
 
 
 def test_what_was_heard_of_a_port_that_is_gone_is_on_the_disk(box):
+    line = box.line
     box.pull()
     box.asked(lambda c: c.recorder.look())
     link = box.worker.published.get("link")
     assert (link["state"], link["retry_s"]) == ("down", 0.25)
+    assert not line.is_open
     assert box.worker.controller.session.pending == 0
 
 
@@ -242,8 +244,6 @@ def test_how_long_the_disk_is_at_a_write_is_known_while_it_is(box):
     box.trouble = Trouble("looked", "commit")
     box.asked(lambda c: c.wait(0.1))
     assert seen[0] > 0.0 == box.worker.disk_s()
-    box.worker.controller.close()
-    assert box.worker.disk_s() == 0.0
 
 
 def test_a_worker_that_ends_disarms_and_answers_whatever_waits(box):
@@ -268,6 +268,14 @@ def test_what_fails_is_in_the_state_before_it_is_answered(box):
     _, error = seen_at_answer(box, fail, lambda: box.worker.published.get("error"))
     assert error["message"] == "the disk is full"
     assert box.board._controller.phase is not Phase.ARMED, "what cannot be kept must not fall"
+
+
+def test_what_cannot_be_kept_is_not_asked_for_but_all_is_switched_off(box, monkeypatch):
+    box.arm()
+    full = Mock(side_effect=SessionError("the disk is full"))
+    monkeypatch.setattr(box.worker.controller.session, "log_bytes", full)
+    assert isinstance(box.asked(lambda c: c.wait(0.1)), SessionError)
+    assert box.board._controller.phase is Phase.IDLE
 
 
 def test_what_waits_for_the_disk_is_said_once_and_only_where_anything_does(box):
@@ -316,6 +324,7 @@ def test_stop_ends_the_search_for_a_board_that_does_not_answer(box):
     outcome, ended_s = seen_at_answer(box, lambda c: c.connect(), box.now)
     assert isinstance(outcome.exception(), StoppedError)
     assert ended_s - begun_s < 3.0
+    assert not box.line.is_open
 
 
 @pytest.mark.slow

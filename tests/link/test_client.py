@@ -16,7 +16,7 @@ from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.exchange import STRANGE_BYTES
 from rig.link.frames import Decoder, Frame, encode
-from rig.link.port import open_port, port_clock
+from rig.link.port import check_url, open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Incoming, Restart, Transcript
 from rig.reasons import make_reason
@@ -116,18 +116,6 @@ class Captive(FakePort):
 
 def test_a_boot_loader_is_left_in_peace_until_it_lets_go(clock):
     assert Device(Captive(clock, {}), clock).connect() == IDENTITY
-
-
-@pytest.mark.parametrize(
-    ("ask", "times", "within"), [(Device.abort, 5, 1.0), (lambda board: board.fire(1), 3, 0.8)]
-)
-def test_enough_leave_before_an_armed_board_switches_itself_off(clock, ask, times, within):
-    port, sent = FakePort(clock, {}), []
-    port.write = lambda data: sent.append((clock.now_ns(), data))
-    port.read = lambda size=1: clock.sleep(0.001) or b""
-    refused(DeviceTimeoutError, "", ask, Device(port, clock))
-    assert sent[times - 1][0] < within * wire.HOST_SILENCE_MS * 1e6
-    assert len({data for _, data in sent}) == 1
 
 
 @pytest.mark.parametrize("noise", [b"\x55" * 4096, bytes(range(256)) * 16, b"\0" * 4096])
@@ -291,13 +279,27 @@ def test_arming_again_begins_anew_but_a_repeated_answer_does_not():
     transcript = Transcript()
     order = wire.Arm(1, 0x00FF, 0, 0, 1, 1)
     say(transcript, "tx", order, seq=1)
+    say(transcript, "rx", wire.Disarmed(7, wire.DisarmReason.TIMEOUT))  # answers nothing
     say(transcript, "rx", wire.Armed(9), ack=1)
     say(transcript, "rx", events_frame(0, (110, 1)))
     say(transcript, "rx", wire.Armed(9), ack=1)
-    assert transcript.assembly(1).begun
+    assert (transcript.assembly(1).begun, transcript.assembly(1).gates) == (True, 0x00FF)
     say(transcript, "tx", order, seq=2)
     say(transcript, "rx", wire.Armed(9), ack=2)
     assert not transcript.assembly(1).begun
+
+
+def test_a_restart_is_given_with_all_that_is_known_of_it():
+    """The first, behind the opening of the port, is none: it tells how long the board starts up."""
+    transcript, second = Transcript(), 10**9
+    transcript.feed("tx", second, b"\0")
+    assert len(say(transcript, "rx", wire.Boot(1), ns=2 * second)) == 1
+    say(transcript, "tx", wire.Arm(1, 1, 0, 0, 1, 1), seq=1)
+    say(transcript, "rx", wire.Armed(9), ack=1)
+    say(transcript, "tx", wire.Fire(9), seq=2)
+    say(transcript, "rx", wire.Fired(5), ack=2, ns=5 * second)
+    given = [say(transcript, "rx", wire.Boot(4), ns=at * second)[1] for at in (7, 8)]
+    assert given == [Restart(7 * second, 4, 1, 2.0, 1.0), Restart(8 * second, 4, None, 0.0, 1.0)]
 
 
 def test_half_a_frame_before_a_reconnect_swallows_nothing():
@@ -404,6 +406,7 @@ def test_nothing_listens():
         free.bind(("127.0.0.1", 0))
         number = free.getsockname()[1]
     nobody = f"socket://127.0.0.1:{number}"
+    check_url(nobody)
     assert "HOST:PORT" in refused(DeviceError, f":{number}: Connection ref", open_port, nobody).hint
 
 
