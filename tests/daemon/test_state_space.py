@@ -175,20 +175,6 @@ def test_a_test_of_the_release_needs_control_a_session_nothing_armed_and_a_close
     assert box.fell == []
 
 
-@pytest.mark.parametrize("deeds", [1, 2])
-def test_a_stop_ends_a_test_of_the_release(box, monkeypatch, deeds):
-    """Behind ARM, and behind FIRE; also where no ABORT goes past the worker."""
-    monkeypatch.setattr(box.worker, "_abort_past", lambda: False)
-    box.board.lab.drop = Mock(return_value=[])
-    box.trouble = Trouble("stopped", "written", deeds)
-    assert isinstance(box.asked(lambda c: c.test_release()), StoppedError)
-    assert box.board.lab.drop.called == (deeds == 2)
-    assert (box.board.outputs(), box.phase) == (0, Phase.IDLE)
-    assert box.worker.published.get("release_test") is None
-    box.passed(1.0)
-    assert isinstance(box.arm(), int), "nothing is left behind that forbids it"
-
-
 def test_a_test_of_the_release_that_is_not_whole_is_shown(box):
     box.board.lab.drop = lambda _: box.board.stop(True) or []
     assert "stop" in box.asked(lambda c: c.test_release())["faults"][0]
