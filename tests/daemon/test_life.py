@@ -1,7 +1,6 @@
 """The life of sessions as clients have it: each answer, each change, and what stays in the file."""
 
 import json
-import threading
 from dataclasses import replace
 from zlib import crc32
 
@@ -125,4 +124,3 @@ def test_a_client_finds_in_the_file_what_it_has_asked_for(tmp_path, monkeypatch)
     refused(SessionError, "no session is open", getattr, client, "session")
     refused(SessionError, "closed", session.pings)
     client.close()
-    assert "rig worker" not in {thread.name for thread in threading.enumerate()}

@@ -129,11 +129,6 @@ def test_raw_records_are_never_altered(filled, table, statement):
     refuse(filled, statement.format(table=f'"{table}"', column=f'"{TABLES[table].names()[-1]}"'))
 
 
-def test_a_drop_is_not_replaced_under_another_number(filled):
-    columns = ", ".join(TABLES["drop"].names()[1:])
-    refuse(filled, f'INSERT OR REPLACE INTO "drop" SELECT id + 100, {columns} FROM "drop"')
-
-
 def refuse(path, statement):
     with closing(sqlite3.connect(path)) as connection:
         before = list(connection.iterdump())
