@@ -295,6 +295,18 @@ def test_a_stop_after_a_release_that_was_not_answered_keeps_what_fell(box):
     assert box.on_disk("state", (1, 1)) == ["armed", "fired", "recorded"]
 
 
+def test_a_stop_that_comes_while_all_is_switched_off_is_kept(box):
+    late = []
+    box.arm()
+    box.lease.release("A")
+    box.stopping = lambda _: late.append(box.worker.stop("a second client"))
+    box.trouble = Trouble("stopping", "write")  # ABORT
+    box.turned()
+    box.turned()
+    assert late[0].result(0.0) is None
+    assert box.worker._attended.is_set(), "no ABORT follows that could end what is armed anew"
+
+
 def test_a_session_that_is_opened_ends_the_trouble_of_the_one_before(box):
     names = str(box.protocol), str(box.session)
     box.worker._weigh(SessionError("the disk is full", "make room"))

@@ -145,9 +145,7 @@ def test_what_does_not_fit_is_refused(kind, values):
 
 @given(st.integers(0, 0xFFFF), st.integers(1, 0xFFFF))
 def test_labels(run, attempt):
-    label = wire.pack_label(run, attempt)
-    assert 0 < label < 2**32
-    assert wire.unpack_label(label) == (run, attempt)
+    assert wire.unpack_label(wire.pack_label(run, attempt)) == (run, attempt)
 
 
 @pytest.mark.parametrize("pair", [(-1, 1), (65536, 1), (1, 0), (1, 65536)])
