@@ -15,7 +15,8 @@ from typing import NamedTuple
 
 from rig.text_rows import read_rows
 
-_COVERAGE_95 = 1.959963984540054  # of a normal distribution, as in rig.analysis.distributions
+COVERAGE_95 = 1.959963984540054
+"""Standard uncertainties of a normal distribution for 95 % coverage."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +39,7 @@ class Quantity:
     @property
     def expanded(self) -> float | None:
         """Expanded uncertainty for 95 % coverage; `None` where the value is exact."""
-        return _COVERAGE_95 * self.u or None
+        return COVERAGE_95 * self.u or None
 
 
 class UnitError(ValueError):

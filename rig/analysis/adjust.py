@@ -16,15 +16,14 @@ Matches = Mapping[str, Index]
 
 STEPS = 60
 """Greatest number of steps of a fit; a good fit needs far fewer."""
-DONE = 1e-3
-"""Step length in standard uncertainties that ends a fit, as the next step is shorter again."""
+DONE = 0.1
+"""Step length in standard uncertainties that ends a fit: convergence is quadratic. With half of it
+no result changes by 0.001 standard uncertainties."""
 PATIENT = 4
 """Short steps in a row after which a fit has converged. An edge at the moment of an impact has a
 different slope on either side, and steps may alternate between them."""
 _DAMPED = 1e-3  # first λ of Levenberg and Marquardt
-_FAINT = 1e-12  # λ below double precision
-_FASTER = 5.0  # factor by which λ grows with each rejected step
-_SLOWER = 3.0  # factor by which λ shrinks with each accepted step
+_FACTOR = 4.0  # by which λ grows with each rejected step, and shrinks with each accepted one
 _GAIN = 0.25  # least share of the linear prediction by which a step reduces the loss
 _MORE = 1.05  # least change of the scatter with which edges are weighed anew
 
@@ -178,11 +177,11 @@ def least_squares(
                 continue
         ahead = look(point.y + step, point.inflation)
         if not ahead.loss <= point.loss - _GAIN * point.predicted_reduction(step):
-            damping = damping * _FASTER or _DAMPED
+            damping = damping * _FACTOR or _DAMPED
             continue
         shorts = 0 if ahead.loss < point.loss - done**2 else shorts
         point, previous = ahead, moved
-        damping = damping / _SLOWER if damping > _FAINT else 0.0
+        damping /= _FACTOR
     step = step if settled else np.zeros_like(x)
     return Estimate(
         (point.y + step) * sd,

@@ -32,8 +32,10 @@ MISSED = 0.02
 """Prior probability that an expected edge is missed."""
 STRAYS = 2.0
 """Prior rate of stray edges at a gate, 1/s."""
-RELEASE, START, CLOCK, PULL, DRAG, ALPHA = range(6)
-"""Columns of a fall's unknowns: release time, start height, clock rate, g, κ, α of all impacts."""
+NAMES = "release", "drop", "clock", "gravity", "drag", "alpha"
+"""Names of a fall's unknowns; without strikes it has no α."""
+RELEASE, START, CLOCK, PULL, DRAG, ALPHA = range(len(NAMES))
+"""Columns of these: release time, start height, clock rate, g, κ, α of all impacts."""
 PART = 6.0
 """Least spacing of two rods over σ of the first step: narrow enough to resolve neighbours."""
 _BROADER = 2.0
@@ -41,12 +43,9 @@ _BROADER = 2.0
 _STEPS = 12
 _FAR = 2.5
 """Radius of the grid of starts in prior standard uncertainties: 99 % of drops as stated."""
-_RECORD = 4.0
-"""Longest part of a record that is searched, s: no fall lasts longer. It has the most edges."""
 _NODES = 400
-_BATCH = 8  # grid points of the first batch
 PEAKS = 5
-"""Starts of a batch that are annealed."""
+"""Starts of a batch that are annealed, and grid points of the first batch."""
 _ALIKE = 0.75
 """Share of equally assigned edges above which two starts converge to the same fall."""
 LEAST = 0.6
@@ -265,9 +264,12 @@ class SideFall:
     @cached_property
     def columns(self) -> Index:
         """Places of its unknowns in the drop's vector, as `RELEASE` and the others say."""
-        names = [f"{self.role} release", "drop", "clock", "gravity", "drag"]
-        names += ["alpha"] * (self.record.ratios is not None)
-        return np.array([self.model.unknowns[name].start for name in names])
+        names = NAMES[:ALPHA] if self.record.ratios is None else NAMES
+        blocks = {
+            **self.model.unknowns.blocks,
+            "release": self.model.unknowns[f"{self.role} release"],
+        }
+        return np.array([blocks[name].start for name in names])
 
     @cached_property
     def sd(self) -> Array:
@@ -449,7 +451,7 @@ class SideFall:
         ndarray
             Falls in descending order of votes.
         """
-        nodes, size = self.nodes(), _BATCH
+        nodes, size = self.nodes(), PEAKS
         while len(nodes):
             batch, nodes = nodes[:size], nodes[size:]
             size *= 2
@@ -460,11 +462,11 @@ class SideFall:
 
     def most_votes(self) -> int:
         """Return the most votes for any fall of the grid's first, likeliest batch."""
-        return int(self._count_votes(self.nodes(_BATCH))[1].max(initial=0))
+        return int(self._count_votes(self.nodes(PEAKS))[1].max(initial=0))
 
     def most_matches(self) -> int:
         """Return how many edges agree, each with a side of its own, with the fall of most votes."""
-        falls, votes = self._count_votes(self.nodes(_BATCH))
+        falls, votes = self._count_votes(self.nodes(PEAKS))
         fall, (edge, side) = falls[np.argsort(-votes)[:1]], self.pairing.pairs
         heights = self.path(fall).heights(self.since(fall, self.record.edges.times))[0]
         near = (np.abs(heights[:, edge] - self.levels[side]) <= self.slack).any(axis=0)
@@ -483,8 +485,8 @@ class SideFall:
         times, lasts = np.sort(self.record.edges.times), (late - early)[late > early]
         if not times.size or not lasts.size:
             return nodes[:0], np.zeros(0, dtype=np.intp)
-        # A record may last hours: search the window with most edges.
-        until = np.searchsorted(times, times + _RECORD, side="right")
+        # A record may last hours: search the part with most edges, as long as the longest fall.
+        until = np.searchsorted(times, times + late.max(), side="right")
         first = int(np.argmax(until - np.arange(times.size)))
         begin = max(float(times[first] - late.max()), earliest)
         end = float(times[until[first] - 1] - early.min())
@@ -508,13 +510,8 @@ class SideFall:
         for peak in falls:
             at = table.argmax(axis=1)
             counts.append(table[row, at])
-            # Use the middle of a plateau of equal votes.
-            ends = [
-                np.argmin(line[n:] == line[n]) for line, n in zip(table, at.tolist(), strict=True)
-            ]
-            middle = at + np.maximum(np.array(ends) - 1, 0) // 2
-            peak[:, RELEASE] = begin + step * (middle + 0.5)
-            table[row[:, None], np.clip(middle[:, None] + near, 0, bins)] = 0
+            peak[:, RELEASE] = begin + step * (at + 1.0)
+            table[row[:, None], np.clip(at[:, None] + near, 0, bins)] = 0
         return falls.reshape(-1, self.columns.size), np.concatenate(counts)
 
     def _unlike(self, falls: Array) -> list[int]:

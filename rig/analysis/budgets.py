@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rig.analysis.budget_lines import BUDGET, COMMON, effective_degrees
-from rig.analysis.distributions import COVERAGE_95, coverage_factor
+from rig.analysis.distributions import coverage_factor
 from rig.analysis.drop_model import DropModel
 from rig.analysis.dual import Dual
 from rig.analysis.gate_passages import GatePassage, gate_passages
@@ -32,6 +32,7 @@ from rig.analysis.unknowns import Side
 from rig.arrays import Array, Flags, Index
 from rig.measurands import MEASURANDS
 from rig.protocol.protocol import GUESSED
+from rig.units import COVERAGE_95
 
 _LINES = {name: place for place, name in enumerate(BUDGET)}
 _GUESSED = [_LINES[name] for name in ("side", "contact")]

@@ -127,7 +127,7 @@ class DropEdges(NamedTuple):
         return edges._replace(gate=numbers), received - places.size
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ChainRecord:
     """One chain and the gates beside it.
 
@@ -164,6 +164,8 @@ class ChainRecord:
         Numbers of gates that are left out, too low for every rod to pass.
     thinned
         Number of edges left out, from the middle of flickers longer than `LONGEST`.
+    blank
+        The record without edges, which all drops of a condition have in common.
     """
 
     role: Side
@@ -180,6 +182,7 @@ class ChainRecord:
     higher: tuple[float, ...] = ()
     aside: tuple[int, ...] = ()
     thinned: int = 0
+    blank: ChainRecord | None = field(default=None, repr=False)
 
     @property
     def strikes(self) -> Array:
@@ -205,9 +208,8 @@ class ChainRecord:
         return self.due.rods.size
 
 
-@lru_cache(maxsize=256)  # a session needs the same few for every drop
 def _due_edges(
-    heights: tuple[tuple[int, float], ...],
+    gates: Sequence[tuple[int, Gate]],
     chain: RodChain,
     start: float,
     higher: tuple[float, ...] | None,
@@ -217,8 +219,8 @@ def _due_edges(
 
     Parameters
     ----------
-    heights
-        Number of each gate in the protocol's list, with its height, m.
+    gates
+        Each gate with its number in the protocol's list.
     start
         Nominal height of the bottom rod's middle before release, m.
     higher
@@ -228,17 +230,17 @@ def _due_edges(
         Whether the timer records only edges that darken a beam, as some do.
     """
     places, half = np.array(chain.chain.heights), np.array(chain.widths)[:, None] / 2.0
-    gates, beams = [np.array(column) for column in zip(*heights, strict=True)]
+    beams = np.array([gate.height for _, gate in gates])
     # A rod's lower side darkens the beam, its upper side clears it.
     levels = (beams[:, None, None] - places[:, None] + np.array([1.0, -1.0]) * half).ravel()
-    rods = np.tile(np.repeat(np.arange(places.size), 2), gates.size)
+    rods = np.tile(np.repeat(np.arange(places.size), 2), beams.size)
     blocks = np.arange(levels.size) % 2 == 0
     seen = (levels < start) & (blocks | (not darkening))
     if higher is not None:
         seen &= levels > (np.array(higher) - places)[rods]
-    gate = np.repeat(gates, 2 * places.size)
+    gate = np.repeat([number for number, _ in gates], 2 * places.size)
     due = DueEdges(rods[seen], blocks[seen], levels[seen], gate[seen])
-    for values in due:
+    for values in due:  # every drop has the same arrays
         values.flags.writeable = False
     return due
 
@@ -278,53 +280,69 @@ def chain_records(
     aside
         Numbers of the gates that are left out, in the protocol's list.
     """
-    whole, shares = DropEdges.of(drop.edges, hz), air_shares(protocol)
+    whole, records = DropEdges.of(drop.edges, hz), []
     darkening = bool(whole.edges.blocked.size and whole.edges.blocked.all())
+    for blank in _blank_records(protocol, run.kind, (*aside,), darkening):
+        edges, thinned = whole.at(_gates_at(protocol, blank.role))
+        records.append(replace(blank, edges=edges, thinned=thinned, blank=blank))
+    return records
+
+
+def _gates_at(protocol: Protocol, side: Side) -> list[tuple[int, Gate]]:
+    return [(n, gate) for n, gate in enumerate(protocol.gates.gates) if gate.side == side]
+
+
+@lru_cache(maxsize=128)  # a session needs the same few for every drop
+def _blank_records(
+    protocol: Protocol, run: Run, aside: tuple[int, ...], darkening: bool
+) -> list[ChainRecord]:
+    """Return a record without edges for each chain, as `chain_records`.
+
+    Parameters
+    ----------
+    darkening
+        As for `_due_edges`.
+    """
+    shares, records = air_shares(protocol), []
     sides: tuple[tuple[Side, str | None], ...] = (("impact", run.impact), ("free", run.free))
-    records = []
     for role, name in sides:
-        gates = [(n, gate) for n, gate in enumerate(protocol.gates.gates) if gate.side == role]
+        gates = _gates_at(protocol, role)
         if name is None or not gates:
             continue
         chain, air = protocol.chains[name], np.array(shares[name])
-        more, impacts = unlike(chain.chain, shares[name]), _impacts(protocol, run, role, chain)
-        heights = tuple((n, gate.height) for n, gate in gates if n not in aside)
-        scene = chain, protocol.drop.value, impacts.get("higher"), darkening
-        edges, thinned = whole.at(gates)
-        # No rod falls after the last leg, but later edges need a leg too.
-        legs = np.append(air, air[-1]) if impacts and np.ptp(air) else air[:1]
+        impacts = {} if role == "free" else _impacts(protocol, run, chain)
+        used = [(n, gate) for n, gate in gates if n not in aside]
+        start, stops = protocol.drop.value, impacts.get("higher")
         records.append(
             ChainRecord(
                 role,
                 chain,
-                edges,
-                _due_edges(heights, *scene),
-                air=legs,
-                unlike=more,
+                DropEdges.of((), 1.0).edges,
+                _due_edges(used, chain, start, stops, darkening),
+                # No rod falls after the last leg, but later edges need a leg too.
+                air=np.append(air, air[-1]) if impacts and np.ptp(air) else air[:1],
+                unlike=unlike(chain.chain, shares[name]),
                 aside=tuple(n for n, _ in gates if n in aside),
-                thinned=thinned,
                 **impacts,
             )
         )
     return records
 
 
-def _impacts(protocol: Protocol, run: Run, role: Side, chain: RodChain) -> dict[str, Any]:
-    """Return the impact fields of a chain's record; empty for a free chain."""
-    if role == "free":
-        return {}
+def _impacts(protocol: Protocol, run: Run, chain: RodChain) -> dict[str, Any]:
+    """Return the fields of a striking chain's record that a free chain's has not."""
     assert protocol.surface is not None
     # γ does not depend on the incline, and 0° is always in the domain of Eq. 13.
     gamma = impact_on(protocol.surface, chain.chain, 0.0).gamma
     alpha, uneven = 0.0, 1.0
     with suppress(DomainError):
-        impact = impact_on(protocol.surface, chain.chain, run.incline_deg or 0.0)
+        impact = impact_on(protocol.surface, chain.chain, run.incline_deg)
         alpha, uneven = impact.alpha, _ON_RODS if impact.basis == "pile" else 1.0
     return {
         "ratios": np.array(kicks(chain.chain, [1.0] * chain.chain.rods, gamma)),
         "alpha": alpha,
         "uneven": uneven,
-        "incline_deg": run.incline_deg or 0.0,
+        "incline_deg": run.incline_deg,
         "condition": str(protocol.condition(run)),
-        "higher": higher_contacts(protocol, run.incline_deg or 0.0, chain),
+        "higher": higher_contacts(protocol, run.incline_deg, chain),
     }

@@ -24,8 +24,6 @@ from rig.predictions import coefficient_slopes, predicted_run
 from rig.protocol.protocol import GUESSED, Condition, Protocol
 from rig.units import Quantity
 
-_ROUNDING = 1e-12
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Difference(Measured):
@@ -139,7 +137,7 @@ def _compare(name: str, lines: Sequence[_Line]) -> Comparison:
     moves = np.array([[line.slopes.get(key, {}).get(name, 0.0) for key in names] for line in lines])
     size = np.sum(moves**2, axis=1) + [line.values[0].u ** 2 for line in lines]
     covariance = _covariance(lines) + moves @ moves.T
-    inexact = covariance.diagonal() > _ROUNDING * size
+    inexact = covariance.diagonal() > math.sqrt(np.finfo(float).eps) * size
     covariance, lines = covariance[np.ix_(inexact, inexact)], [*compress(lines, inexact)]
     differences = tuple(
         Difference(float(line.off.mean()), u, condition=line.condition, n=len(line.values))

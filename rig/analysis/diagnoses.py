@@ -10,23 +10,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rig.analysis.annealing import MISSED
+from rig.analysis.annealing import LEAST, MISSED
 from rig.analysis.chain_records import SIDES, ChainRecord
 from rig.analysis.distributions import most_by_chance
 from rig.analysis.equations import STRAY, standardise
 from rig.analysis.faults import Suspects, gate_values
-from rig.analysis.fit import DropFit, Fit, Matches, match
+from rig.analysis.fit import Fit, Matches
 from rig.arrays import Flags, Index
 from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, make_reason
 
-STRANGE = 0.5
-"""Matched share of its expected edges below which a gate disagrees with its chain; below `RIGHT`
-too, if more than `FEW` are missing."""
-RIGHT = 0.8
-FEW = 8
-"""Also the number of gates of which any two are tried as exchanged; half of it in a drop that is
-identified."""
+_PAIRED = 8
+"""Gates of which any two are tried as exchanged; half of it in a drop that is identified."""
 
 
 class GateCount(NamedTuple):
@@ -101,7 +96,7 @@ def gate_counts(records: Iterable[ChainRecord], matches: Matches | None = None) 
 def silent(protocol: Protocol, records: Collection[ChainRecord]) -> Iterator[Reason]:
     """Yield reasons for gates without edges while the others have theirs."""
     heard = gate_counts(records)
-    if sum(gate.missing for gate in heard) >= STRANGE * sum(gate.seen.size for gate in heard):
+    if sum(gate.missing for gate in heard) >= (1.0 - LEAST) * sum(gate.seen.size for gate in heard):
         return
     for record in records:
         due = sorted({*record.due.gate.tolist()})
@@ -120,7 +115,7 @@ def gate_reasons(fit: Fit) -> Iterator[Reason]:
     off = np.abs(standardise(estimate.x[beams], estimate.sd[beams]))
     for gate in gate_counts(records, fit.matches):
         where, deviations = _values(protocol, gate.gate), float(off[gate.gate])
-        if gate.share < STRANGE or (gate.share < RIGHT and gate.missing > FEW):
+        if gate.share < LEAST:
             # A gate with few expected edges may miss a rod by chance, without effect on the result.
             code = "gate_disagrees" if gate.seen.size >= 2 * SIDES else "gate_disagrees_few"
             yield make_reason(code, words, **where, share=gate.share)
@@ -139,7 +134,7 @@ def suspects(records: Collection[ChainRecord], matches: Matches | None = None) -
     """
     counts = gate_counts(records, matches)
     worst = sorted(counts, key=lambda gate: -gate.missing - gate.surplus)
-    worst = worst[: FEW // 2 if matches else FEW]
+    worst = worst[: _PAIRED // 2 if matches else _PAIRED]
     crowded = [gate for gate in counts if gate.surplus >= SIDES]
     lacking = [gate for gate in counts if gate.lacks_end]
     absent, more = {}, any(_are_crossed(*pair) for pair in product(lacking, crowded))
@@ -165,18 +160,18 @@ def _values(protocol: Protocol, gate: int) -> dict[str, Any]:
 
 
 def gates_too_low(
-    protocol: Protocol, records: Iterable[ChainRecord], drop: DropFit | None
+    protocol: Protocol, records: Iterable[ChainRecord], matches: Matches | None
 ) -> tuple[int, ...]:
     """Return the lowest gates beside the striking chain that miss more rods than by chance.
 
-    There, rods strike before they pass, or lie in the beam; rods that pass late count as missed.
-    The highest gate is never left out. The rate of chance misses is that of all other gates.
+    There, rods strike before they pass, or lie in the beam. The highest gate is never left out. The
+    rate of chance misses is that of all other gates.
 
     Parameters
     ----------
     records
         The chains with their edges.
-    drop
+    matches
         `None` if the drop is not identified: then the number of edges is used.
 
     Returns
@@ -184,8 +179,7 @@ def gates_too_low(
     tuple of int
         Numbers of the gates in the protocol's list.
     """
-    in_time = None if drop is None else match(drop.model, drop.x)
-    counts = gate_counts(records, in_time)
+    counts = gate_counts(records, matches)
     due, hidden = sum(gate.due for gate in counts), sum(gate.hidden for gate in counts)
     struck, gates = [gate for gate in counts if gate.role == "impact"], protocol.gates.gates
     low: list[int] = []

@@ -7,8 +7,6 @@ predictions, checks and plans do not need it.
 from functools import lru_cache
 from typing import Any
 
-COVERAGE_95 = 1.959963984540054
-"""`coverage_factor` of the normal distribution, to save the import of scipy."""
 _ONCE_IN = 1e-3
 
 

@@ -14,7 +14,7 @@ from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer
 from rig.analysis.faults import Premise, Suspects
-from rig.analysis.fit import Begun, DropFit, Fit, settle
+from rig.analysis.fit import Begun, DropFit, Fit, match, settle
 from rig.analysis.gravity import free_gravity
 from rig.analysis.identify import DropIdentity, few_edges, identify, pattern_faults
 from rig.analysis.joint_fit import by_itself
@@ -164,11 +164,10 @@ class DropCase:
                 return without
         return stated._judge(*fits[stated.aside], readings, explain=explain)
 
-    def _too_low(self, drop: DropFit | None) -> tuple[int, ...]:
+    def _too_low(self, fit: Fit | None) -> tuple[int, ...]:
         """Return the gates that are left out or too low for a drop, fitted with any of them."""
-        if drop is not None and any(record.aside for record in drop.model.records.values()):
-            drop = DropFit(self._model(drop.model.alpha), {}, drop.x)
-        return *self.aside, *gates_too_low(self.protocol, self.records, drop)
+        matches = None if fit is None else match(self._model(fit.model.alpha), fit.x)
+        return *self.aside, *gates_too_low(self.protocol, self.records, matches)
 
     def _at_contact(self) -> DropCase:
         return replace(self, protocol=of_run(self.protocol, self.run))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -104,8 +104,7 @@ class DropModel:
         alpha: float | None = None,
     ) -> DropModel:
         """Return a drop's model with the protocol's priors; all but its edges is cached."""
-        content = tuple(map(_expectations, records))
-        return _model_of(_Condition(protocol, content, tuple(records))).copy_with(
+        return _model_of(protocol, *(record.blank for record in records)).copy_with(
             records={record.role: record for record in records},
             alpha=records[0].alpha if alpha is None else alpha,
             clock_u=clock_u,
@@ -315,26 +314,6 @@ def _strike_u(model: DropModel, role: str) -> Array:
     return np.clip(_TOLD * sd, SHARPEST, min(model.records[role].chain.widths) / PART)
 
 
-@dataclass(frozen=True)
-class _Condition:
-    """Cache key: all that a model depends on but its edges; `records` of any drop like it."""
-
-    protocol: Protocol
-    content: tuple[object, ...]
-    records: tuple[ChainRecord, ...] = field(compare=False)
-
-
 @lru_cache(maxsize=64)
-def _model_of(condition: _Condition) -> DropModel:
-    protocol, records = condition.protocol, condition.records
-    model = DropModel(protocol, records, 0.0)
-    model.condition = condition
-    return model
-
-
-def _expectations(record: ChainRecord) -> tuple[object, ...]:
-    """Return the hashable content of a record without its edges."""
-    arrays = [record.air, record.unlike, *(() if record.ratios is None else (record.ratios,))]
-    fields = record.role, record.chain, record.alpha, record.incline_deg, record.higher
-    parts = (array.tobytes() for array in (*arrays, *record.due))
-    return (*fields, record.condition, record.aside, *parts)
+def _model_of(protocol: Protocol, *blank: ChainRecord) -> DropModel:
+    return DropModel(protocol, blank, 0.0)

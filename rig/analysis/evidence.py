@@ -29,8 +29,7 @@ _LEAVES = {"departure", "stretch"}  # departures of chains from the model's equa
 _DOUBTED = 2.0
 """Least share of every other component, in units of the estimated share of the stated departures;
 half or three halves of this factor change no coverage by more than a percentage point."""
-_INNER = 40  # steps; the next round of the joint fit continues
-_SETTLED = 1e-3  # relative change of variances at convergence
+_INNER = 10  # steps; the next round of the joint fit continues
 _BINS = 64
 
 
@@ -191,9 +190,7 @@ class Evidence:
             estimates = squares * share**2 + beforehand * (member @ kinds)
             degrees = counts * share + beforehand
             grown = kinds @ (estimates / total**2) / np.maximum(kinds @ (degrees / total), tiny)
-            before, variances = variances, np.maximum(variances * grown, LEAST_SHARE**2 * stated)
-            if (np.abs(variances - before) <= _SETTLED * before).all():
-                break
+            variances = np.maximum(variances * grown, LEAST_SHARE**2 * stated)
         for name, sizes, variance in zip(names, kinds, variances.tolist(), strict=True):
             new[name] = variance**0.5
             self.degrees[name] = max(STATED_WEIGHT, float(degrees[sizes > 0.0].sum()))

@@ -18,9 +18,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rig.analysis.annealing import LEAST, MISSED, Pairing
+from rig.analysis.annealing import LEAST, MISSED, PEAKS, Pairing
 from rig.analysis.chain_records import ChainRecord, chain_records, thin
-from rig.analysis.diagnoses import RIGHT
 from rig.analysis.faults import Fault, Premise, Suspects, faults
 from rig.analysis.fit import Fit, settle
 from rig.analysis.identify import identify, side_fall, well_read
@@ -37,7 +36,6 @@ CLEAR = math.log(100.0)
 """Least log odds of a named fault against every rival and the stated protocol. Also the cost of a
 fault's prior probability: 1 drop in 100 has a given fault."""
 _NAMED = 3  # faults listed if none is clear, and moments of a brake that are fitted
-_TRIED = 5  # faults that are fitted: those with the largest score, and those with the most votes
 _DEPARTURES = "stretch", "landed", "bounce"
 _BEYOND = 10.0  # factor on the scale of a departure, in a fall that departs from the equations
 
@@ -203,7 +201,7 @@ class Explainer:
         for n in np.argsort(-gains).tolist():
             if gains[n] > least:
                 likely.setdefault(sized[n].kin, sized[n])
-        for alike in [fault.alike for fault in likely.values()][:_TRIED]:
+        for alike in [fault.alike for fault in likely.values()][:PEAKS]:
             odds = self._score_odds(fit, self.stated, alike)
             for n in np.argsort(-odds)[:_NAMED].tolist():
                 yield from self._fit_size(alike[n], 0.0, fit)
@@ -256,10 +254,10 @@ class Explainer:
                 (*self._net(fault.change(self.stated, size), least), size) for size in fault.sizes
             ]
             share, net, size = max(sized, key=lambda row: row[1])
-            if share >= RIGHT and net >= least:
+            if share >= LEAST and net >= least:
                 candidates.append((net, fault, size))
         candidates.sort(key=lambda row: -row[0])
-        for _, fault, size in candidates[:_TRIED]:
+        for _, fault, size in candidates[:PEAKS]:
             yield from self._afresh(fault, size)
 
     def _net(self, premise: Premise, least: float = -math.inf) -> tuple[float, int]:

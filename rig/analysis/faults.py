@@ -27,8 +27,7 @@ _WIDER = 0.5  # share of the thinnest rod by which rods may differ in thickness
 _BEHIND = 0.1  # m by which a braked chain may be behind at its last edge
 _UNTOLD = 0.5
 """Departures of a chain that no fault explains, in units of its edges' scatter."""
-_MOMENTS = 12
-_FINER = 16
+_MOMENTS = 16
 """Parts of a fall at whose ends a chain may be braked, and parts of one of these."""
 
 
@@ -102,7 +101,7 @@ class Fault:
     @property
     def alike(self) -> list[Fault]:
         """The fault, and if it is a brake those at moments between the ones next to it."""
-        finer = np.arange(1 - _FINER, _FINER) / (_FINER * _MOMENTS) if self.power else np.zeros(1)
+        finer = np.arange(1 - _MOMENTS, _MOMENTS) / _MOMENTS**2 if self.power else np.zeros(1)
         return [replace(self, moment=self.moment + later) for later in finer.tolist()]
 
     def values(self, size: float, u: float) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.analysis.adjust import Estimate, adjust
+from rig.analysis.adjust import DONE, Estimate, adjust
 from rig.analysis.annealing import PART, count_matched, log_density, matched
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY
@@ -24,14 +24,11 @@ class Begun(NamedTuple):
     x: Array
 
 
-CLOSE = 0.1
-"""Length of a drop's last step in standard uncertainties; convergence is quadratic. With half of it
-no result changes by 0.001 standard uncertainties."""
 _FINE = 0.8e-3  # m, standard deviation of an edge about a fitted trajectory, for matching
 _NEAR = 10.0  # standard uncertainties: step length after which edges are matched again
 _ROUNDS = 6
-_MEDIANS = 2.2
-"""Standard deviations for a median: 1/0.6745, times 1.5 for the scatter of few edges."""
+_MEDIAN = 0.6745
+"""Median of the absolute values of a standard normal distribution."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -129,11 +126,11 @@ def settle(model: DropModel, x: Array, matches: Matches | None = None) -> Fit:
         Matches to begin with; those at `x` if not given.
     """
     matches, scatter = match(model, x) if matches is None else matches, 1.0
-    for done in (_NEAR, *[CLOSE] * _ROUNDS):
+    for done in (_NEAR, *[DONE] * _ROUNDS):
         rough, used = done == _NEAR, matches  # this fit need not converge, as matches will change
         estimate = adjust(model, matches, x, done=done, scatter=scatter, rough=rough)
         x, scatter = estimate.x, 1.0 if rough else estimate.scatter
-        matches = without_strays(model, x, match(model, x), scatter)
+        matches = without_strays(model, x, match(model, x))
         if not rough and all(np.array_equal(used[role], matches[role]) for role in used):
             break
     return Fit(model, used, x, estimate)
@@ -141,7 +138,7 @@ def settle(model: DropModel, x: Array, matches: Matches | None = None) -> Fit:
 
 def alone(drop: DropFit) -> Fit:
     """Fit a drop by itself from its present unknowns, with the same matches."""
-    estimate = adjust(drop.model, drop.matches, drop.x.copy(), done=CLOSE)
+    estimate = adjust(drop.model, drop.matches, drop.x.copy())
     return Fit(drop.model, drop.matches, estimate.x, estimate)
 
 
@@ -161,34 +158,16 @@ def match(model: DropModel, x: Array) -> Matches:
     return matches
 
 
-def without_strays(model: DropModel, x: Array, matches: Matches, scatter: float = 1.0) -> Matches:
+def without_strays(model: DropModel, x: Array, matches: Matches) -> Matches:
     """Return matches without those far off the fitted motion, such as a bounce for a missed edge.
 
-    Parameters
-    ----------
-    scatter
-        Scatter of the edges relative to that of the model.
+    Strays enlarge the scatter, so the limit is relative to the median, which is robust.
     """
-    return {role: _kept(model, role, x, side, scatter) for role, side in matches.items()}
-
-
-def _kept(model: DropModel, role: str, x: Array, side: Index, scatter: float) -> Index:
-    rows = model.residuals(role, x, side)
-    far = np.abs(rows.values) / rows.sigma
-    # Strays enlarge the scatter, so the limit also uses the median, which is robust.
-    usual = max(1.0, _MEDIANS * float(np.sort(far)[far.size // 2])) if far.size else 1.0
-    limit = STRAY * min(scatter, usual)
-    stray = far > limit
-    # If a rod's two edges are inconsistent, remove the one further off, and the other too if it is
-    # beyond half the limit.
-    parted = model.decorrelate(role, rows, side)
-    second = np.flatnonzero(np.abs(parted.values) > limit * parted.sigma)
-    second = second[parted.sigma[second] < rows.sigma[second]]
-    stray[second - (far[second - 1] > far[second])] = True
-    for either in (second, second - 1):
-        stray[either] |= far[either] > 0.5 * limit
-    if not stray.any():
-        return side
-    kept = side.copy()
-    kept[matched(side)[0][stray]] = -1
+    kept: Matches = {}
+    for role, side in matches.items():
+        rows = model.residuals(role, x, side)
+        far = np.abs(rows.values) / rows.sigma
+        usual = max(1.0, float(np.median(far)) / _MEDIAN) if far.size else 1.0
+        kept[role] = side.copy()
+        kept[role][matched(side)[0][far > STRAY * usual]] = -1
     return kept

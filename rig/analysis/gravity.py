@@ -25,8 +25,6 @@ from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, make_reason
 from rig.units import Quantity
 
-_FEWEST = 8  # edges
-
 
 @dataclass(frozen=True, slots=True)
 class GravityCheck(Record):
@@ -101,7 +99,7 @@ def free_gravity(fit: Fit) -> Measured | None:
     if rows is None or model.protocol.surface is None:
         return None
     edges, free = count_matched(fit.matches["free"]), rows.columns
-    if edges < _FEWEST:
+    if edges < STATED_WEIGHT:
         return None
     at = int(np.flatnonzero(free == model.unknowns["gravity"].start)[0])
     x, sd, pull = estimate.x[free], estimate.sd[free], model.unknowns.pull(estimate.x)[free]

@@ -30,8 +30,6 @@ Reading = TypeVar("Reading", FallFit, Fit)
 
 LEAD = math.log(1000.0)
 """Least log odds of a reading against the likeliest different one; below, a drop is ambiguous."""
-_CLEAR = 0.97
-"""Matched share of the matchable edges above which no other start is tried."""
 FAIR = 0.9
 """Matched share of the matchable edges above which a reading is good. With 0.95 fewer faults are
 named; with as many misses as chance allows, few edges would hide a fault of the set-up."""
@@ -170,7 +168,7 @@ def _read(fall: SideFall, earliest: float, batches: int | None) -> list[FallFit]
     """Anneal batches of starts until a reading explains the edges; the likeliest first."""
     readings: list[FallFit] = []
     least, matchable = LEAST * fall.record.edge_count, fall.pairing.matchable
-    enough = max(least, _CLEAR * matchable)
+    enough = max(least, (1.0 - MISSED) * matchable)
     if not fall.record.edges.times.size or matchable < least:
         return readings
     for starts in itertools.islice(fall.starts(earliest, least), batches):

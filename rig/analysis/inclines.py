@@ -11,12 +11,12 @@ from contextlib import suppress
 
 from rig.analysis.fit import Fit
 from rig.analysis.identify import LEAD
+from rig.analysis.last_passages import APART
 from rig.errors import DomainError
 from rig.model.predict import expected_alpha
 from rig.protocol.protocol import Run
 from rig.reasons import Reason, make_reason
 
-_FITS = 2.0  # standard uncertainties within which α matches another incline
 _MODEL = 0.15
 """Relative standard uncertainty of the model's α: resolved rods give up to 40 % more."""
 
@@ -36,6 +36,6 @@ def other_incline(fit: Fit, run: Run) -> Iterator[Reason]:
             far = abs(alpha - expected.value) / sd
             fits[angle] = -0.5 * far**2 - math.log(sd), far
     best = max(fits, key=lambda angle: fits[angle], default=stated)
-    if stated in fits and fits[best][1] < _FITS and fits[best][0] > fits[stated][0] + LEAD:
+    if stated in fits and fits[best][1] < APART and fits[best][0] > fits[stated][0] + LEAD:
         values = {"alpha": alpha, "U95": 2.0 * u, "likelier_deg": best, "stated_deg": stated}
         yield make_reason("other_incline", model.protocol.vocabulary, **values)

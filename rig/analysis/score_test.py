@@ -4,6 +4,7 @@ It uses the slope and curvature of the log likelihood at the best estimate, alon
 the unknowns without a prior.
 """
 
+import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -13,8 +14,6 @@ from rig.analysis.annealing import matched
 from rig.analysis.faults import Braked
 from rig.analysis.fit import Fit
 from rig.arrays import Array
-
-_UNTOLD = 1e-12  # share of a direction's information below which other unknowns replace it
 
 
 class Scores(NamedTuple):
@@ -70,6 +69,6 @@ def scores(
     follow = -estimate.inverse @ (estimate.inverse.T @ (jacobian.T @ moved))
     # Information left by the other unknowns and priors, without a difference of large numbers.
     own = np.sum((moved + jacobian @ follow) ** 2, axis=0) + np.sum(follow**2, axis=0)
-    h = np.where(own > _UNTOLD * np.sum(moved**2, axis=0), own, np.inf)
+    h = np.where(own > math.sqrt(np.finfo(float).eps) * np.sum(moved**2, axis=0), own, np.inf)
     slope, u = left @ moved, np.where(np.isfinite(h), h**-0.5, np.inf)
     return Scores(-slope / h, u, 0.5 * slope**2 / h, estimate.sd[:, None] * follow)

@@ -25,7 +25,8 @@ from rig.analysis.free_flight import (
 from rig.arrays import Array, Index
 
 ONE = np.ones(1)
-COMMON = 4
+NAMES = "release", "start", "gravity", "drag"
+COMMON = len(NAMES)
 RELEASE, START, GRAVITY, DRAG = range(COMMON)
 """Columns of every trajectory's derivatives: release time, start height, acceleration, κ."""
 _STILL = float(np.finfo(float).eps)

@@ -21,7 +21,7 @@ from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import ALPHA_SD, Components, above
 from rig.analysis.departures import MODES, drawn, lags, lever, slack, strike_u, swing_sd
 from rig.analysis.equations import SHARED, ExpectedEdges, standardise
-from rig.analysis.trajectory import COMMON, DRAG, GRAVITY, RELEASE, START
+from rig.analysis.trajectory import COMMON, NAMES, ONE
 from rig.arrays import Array, Flags, Index
 from rig.predictions import air_of
 from rig.protocol.protocol import Gates, Protocol
@@ -128,7 +128,7 @@ class Unknown:
     of: Literal["all", "each", "impact", "free"] = "all"
     shared: Literal["rig", "air", "posts", "beams", "start", "chain", "condition", "drop"] = "drop"
     moves: str = ""
-    path: Effect = lambda _side: np.ones(1)
+    path: Effect = lambda _side: ONE
     level: Effect | None = None
     rate: float = 0.0
     scale: str = ""
@@ -346,7 +346,7 @@ TABLE = tuple(
         cast(Any, of),
         cast(Any, shared),
         moves,
-        PATHS.get(name, lambda _: np.ones(1)),
+        PATHS.get(name, lambda _: ONE),
         LEVELS.get(name),
         float(moves == "rate"),
         scale,
@@ -430,8 +430,7 @@ def _named_rows(model: DropModel) -> Iterator[tuple[str, Unknown, Side]]:
 
 def parameters(struck: int) -> dict[str, slice]:
     """Return the slices of a trajectory's parameters by name, for `struck` rods that strike."""
-    places = {"release": RELEASE, "start": START, "gravity": GRAVITY, "drag": DRAG}
-    spans = {name: slice(place, place + 1) for name, place in places.items()}
+    spans = {name: slice(place, place + 1) for place, name in enumerate(NAMES)}
     ends = [COMMON, COMMON + struck, COMMON + 2 * struck]
     return spans | {"gains": slice(*ends[:2]), "places": slice(*ends[1:]), "all": slice(0, ends[2])}
 

@@ -8,7 +8,7 @@ from rig.analysis.chain_records import SIDES
 from rig.analysis.diagnoses import gate_reasons
 from rig.analysis.distributions import most_by_chance
 from rig.analysis.edge_classes import UnmatchedEdge
-from rig.analysis.equations import STRAY
+from rig.analysis.equations import HUBER, STRAY
 from rig.analysis.fit import Fit
 from rig.analysis.identify import RESTLESS
 from rig.analysis.inclines import other_incline
@@ -22,8 +22,6 @@ from rig.records import Drop
 LATE = 0.2
 """Share of possibly late stamps, close after another stamp, above which a remark is made. Sixteen
 gates passed at 5 m/s have 5 % by chance; four times that is noise on a wire."""
-
-_SURE = 4.0  # standard uncertainties
 
 
 def verdict_of(reasons: Iterable[Reason]) -> Verdict:
@@ -152,5 +150,5 @@ def _air(fit: Fit) -> Iterator[Reason]:
         yield make_reason("air", words, kappa=by_edges, U95=u95)
     if estimate.scatter > RESTLESS and abs(off) > APART * sd:  # this is no fall
         yield make_reason("air_implausible", words, kappa=kappa, factor=estimate.scatter)
-    if kappa < -_SURE * u:  # negative drag is not physical, so that some input is wrong
+    if kappa < -HUBER * u:  # negative drag is not physical, so that some input is wrong
         yield make_reason("air_accelerates", words, kappa=kappa, U95=2.0 * u)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.fit import CLOSE
+from rig.analysis.adjust import DONE
 from rig.analysis.last_passages import disagreements
 from rig.analysis.likeness import ENOUGH, Likeness, likeness
 from rig.analysis.result import GOOD, Measured
@@ -163,7 +163,7 @@ def test_gates_that_not_all_rods_pass_are_left_out(gates):
         if not name.endswith(("strike_m", "strike_m_s")):
             found = result.quantities[name]
             # Both end where a step is short enough, from different beginnings.
-            assert abs(found.value - measured.value) < CLOSE * measured.u, name
+            assert abs(found.value - measured.value) < DONE * measured.u, name
             assert found.u == pytest.approx(measured.u, rel=0.01), name  # it has two digits
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.analysis.fit import CLOSE
+from rig.analysis.adjust import DONE
 from rig.analysis.result import DropResult
 from rig.records import Edge
 from sim.dials import Dials
@@ -40,7 +40,7 @@ def test_origin_and_unit_of_time_and_other_gates(scene, seconds):
     found, expected = other.analyze(), one.analyze()
     assert sorted(found.matches.values()) == sorted(expected.matches.values())
     # Both end where a step is short enough, and the next one would be by its square.
-    assert_same(expected, replace(found, rods=expected.rods), CLOSE**2)
+    assert_same(expected, replace(found, rods=expected.rods), DONE**2)
 
 
 def coarse(one: Case) -> Case:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from rig.analysis.result import DropResult
 from rig.analysis.session import analyze
-from rig.analysis.verdict import _SURE, _air
+from rig.analysis.verdict import _air
 from rig.errors import InputError
 from rig.protocol.protocol import Accept, Gates
 from rig.reasons import Reason, make_reason, plain_reason
@@ -135,7 +135,7 @@ def test_air_that_pushes_is_told_of_beyond_its_own_uncertainty(share, pushed):
     u = 0.5 * 4.0  # of the unknown in its own units, and one of these
     fit = SimpleNamespace(
         model=SimpleNamespace(
-            protocol=UNIFORM, unknowns={"drag": slice(0, 1)}, kappa=lambda _x: -share * _SURE * u
+            protocol=UNIFORM, unknowns={"drag": slice(0, 1)}, kappa=lambda _x: -share * 4.0 * u
         ),
         estimate=SimpleNamespace(x=[0.0], inverse=np.array([[0.5]]), sd=[4.0], scatter=1.0),
     )
