@@ -223,10 +223,6 @@ def test_create_never_overwrites(path):
     assert path.read_text() == "precious"
 
 
-def test_create_in_a_missing_folder(tmp_path):
-    refused(SessionError, "No such file", make, tmp_path / "no" / "such.rig")
-
-
 @pytest.mark.parametrize("readonly", [False, True])
 @cases
 def test_what_is_no_session(path, kind, what, words, told, readonly, call):
