@@ -1,5 +1,7 @@
 """There is one predictor: tables, curves and the terminal say the same, with and without air."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from rig.protocol import reader
 from rig.protocol.plan import runs
 from rig.tui.motion import motions
 from tests.cli.lab import PROTOCOLS, short
-from tests.tables import protocol_text
+from tests.tables import protocol_text, read_table
 
 AIR = "drag: {terminal_speed: 12 m/s ± 1 m/s}\n"
 UNLIKE = (
@@ -64,6 +66,13 @@ def test_all_who_predict_say_the_same(name):
             gaps = both[1].model.heights(when[-1:])[0] - heights[-1:]
             longer = np.subtract(*(scene.chains[one].chain.length for one in (run.free, struck)))
             assert gaps[-1] + longer == pytest.approx(line["separation_m"], rel=1e-9)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_what_is_predicted_are_these_numbers(name):
+    said = json.dumps([one.json() for one in predictions(reader.parse(SCENES[name]))])
+    digits = json.loads(said, parse_float=lambda number: float(f"{float(number):.9g}"))
+    assert digits == read_table(__file__, "predicted")[name]
 
 
 @pytest.mark.parametrize("air", ["", AIR])

@@ -127,7 +127,6 @@ class Line:
         finally:
             with self._guard:
                 self._over, unanswered = over, [*self._open.values()]
-                self._open.clear()
             for answer in unanswered:
                 if answer.set_running_or_notify_cancel():
                     answer.set_exception(over)

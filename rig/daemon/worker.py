@@ -90,7 +90,7 @@ class Worker:
         if self._thread.ident is None:
             self._thread.start()
 
-    def submit(self, do: Callable[..., Any], holder: object, *, writes: bool = True) -> Future[Any]:
+    def submit(self, do: Callable[..., Any], holder: object, *, writes: bool) -> Future[Any]:
         """Have something done, when what was asked for before is done.
 
         Parameters

@@ -101,6 +101,8 @@ class Journal:
     def save(self, place: Path) -> int:
         """Write committed and pending records into a new file, and clear the pending ones.
 
+        To be called behind a commit: one that failed has left no transaction open.
+
         Parameters
         ----------
         place
@@ -116,7 +118,6 @@ class Journal:
         sqlite3.Error, OSError
             The session cannot be read, or the new file not written.
         """
-        self._connection.rollback()
         with closing(sqlite3.connect(place, isolation_level=None)) as target:
             self._connection.backup(target)
             target.execute("PRAGMA synchronous = FULL")

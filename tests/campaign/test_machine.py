@@ -5,10 +5,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.campaign import machine as on
-from rig.campaign.machine import BEFORE_RELEASE, LOOK_S, LOOKS, Flow, Stage, step
-from rig.campaign.plan import ATTEMPTS, CLOCK_S, describe_setup, job_to_judge, next_job, rest_s
+from rig.campaign.machine import BEFORE_RELEASE, LOOKS, Flow, Stage, effect_failure, step
+from rig.campaign.plan import ATTEMPTS, describe_setup, job_to_judge, next_job, rest_s
 from rig.campaign.voids import MANY, Void, after, in_common, voids_of, why_halted
+from rig.errors import RigError
 from rig.link.messages import RefusalReason
+from rig.link.refusals import DeviceRefusedError
 from rig.protocol.protocol import Run
 from rig.reasons import NOTE, make_reason, plain_reason
 from rig.recorder.run_lines import RunLine
@@ -111,6 +113,8 @@ def test_only_what_was_armed_and_counted_down_without_a_stop_is_fired(happening,
             armed, waited = event.token or 0, 0.0
         if before.stage is Stage.COUNTDOWN and isinstance(event, on.Tick):
             waited += event.seconds
+        if flow.stage is Stage.COUNTDOWN:
+            assert flow.left_s == pytest.approx(3.0 - waited)
         for effect in effects:
             if isinstance(effect, on.ArmRelease) and attended:
                 assert isinstance(event, on.EffectDone), "nothing is armed by itself"
@@ -140,8 +144,8 @@ def arming(**more):
 @pytest.mark.parametrize("reason", PASSING)
 def test_alone_what_passes_is_waited_for_a_few_times(reason):
     flow = arming(attended=False)
-    pause = 0.7 if reason is RefusalReason.COOLING else LOOK_S
-    for _ in range(LOOKS - 1):
+    pause = 0.7 if reason is RefusalReason.COOLING else 1.0
+    for _ in range(4):
         flow, effects = through(flow, on.EffectFailure(-1, "no", reason, 700), DONE)
         assert effects == [on.Wait(pause), on.ArmRelease(JOB)]
     flow, effects = through(flow, on.EffectFailure(-1, "no", reason, 700))
@@ -206,6 +210,12 @@ def test_neither_the_plans_end_nor_another_attempt_passes_over_it(onward):
     assert (flow.stage, effects) == (Stage.HALTED, [])
 
 
+def test_a_failure_has_the_words_and_the_refusal_of_its_error():
+    refusal = DeviceRefusedError(RefusalReason.COOLING, 1500)
+    assert effect_failure(7, refusal)[2:] == (RefusalReason.COOLING, 1500)
+    assert effect_failure(7, RigError("no", "why")) == (7, "no\nwhy", None, 0)
+
+
 def test_a_drop_that_fell_has_no_refusals_left():
     flow = Flow(Stage.FIRING, job=JOB, attended=False, refusals=LOOKS - 1)
     flow, effects = through(flow, DONE)
@@ -227,7 +237,7 @@ def test_runs_come_in_order_until_each_is_settled_or_void_too_often():
 
 
 def test_chains_rest_longer_while_the_clock_is_not_known():
-    assert rest_s(0.5, None) == rest_s(0.5, 101e-6) == CLOCK_S
+    assert rest_s(0.5, None) == rest_s(0.5, 101e-6) == 2.0
     assert rest_s(0.5, 99e-6) == 0.5
     assert rest_s(9.0, None) == 9.0
 
@@ -257,6 +267,7 @@ def entries(*told):
 
 def test_reasons_are_of_a_kind_without_their_numbers():
     assert in_common(row(*((one,) for one in SKEW))) == ("release skew",)
+    assert "run 3 is tried again" in why_halted(row(*((one,) for one in SKEW)))
     assert in_common(row((SKEW[0],), (LOST, SKEW[1]), (SKEW[2], LOST))) == ("release skew",)
     assert in_common(row((LOST,), (LOST,), (LOST,))) == (LOST.text,)
     assert in_common(row((DEAD[0],), (DEAD[1],), (DEAD[0],))) == ("gate silent (free)",)

@@ -18,6 +18,7 @@ def ended(processes: ProcessFixture, code: int = 0) -> str:
     _, told = processes.daemon.communicate(timeout=PATIENCE_S)
     assert processes.daemon.returncode == code, told
     assert "Traceback" not in told
+    assert code or told.endswith("rig daemon: ended\n")
     return told
 
 
@@ -44,7 +45,7 @@ def working(processes: ProcessFixture) -> Iterator[tuple[Worker, Callable[..., A
     worker.start()
 
     def ask(work: Callable[..., Any]) -> Any:
-        return worker.submit(work, "me").result(PATIENCE_S)
+        return worker.submit(work, "me", writes=True).result(PATIENCE_S)
 
     try:
         files = str(processes.protocol), str(processes.session)

@@ -170,12 +170,12 @@ class Box:
 
     # ------------------------------------------------------------------ what may be done
 
-    def asked(self, work, client="A"):
+    def asked(self, work, client="A", *, writes=True):
         """Have a client ask for something; whether it was done, or not and why."""
         if self.worker is None:
             return None
         self.lease.heard(client)
-        outcome = self.worker.submit(work, client)
+        outcome = self.worker.submit(work, client, writes=writes)
         self.turned()
         if self.worker is None or not outcome.done():
             return None

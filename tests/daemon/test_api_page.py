@@ -35,6 +35,7 @@ def test_the_page_has_the_numbers():
     assert f"| {connection.CLIENTS}; any further" in text
     assert f"| {rpc.WAITING_LIMIT}; more get" in text
     assert f"read | {rpc.UNREAD_LIMIT >> 20} MiB" in text
+    assert f"has code −{-rpc.FAILURE} and" in text
     assert rpc.REQUEST_LIMIT == 64 << 10
     assert rpc.MESSAGE_LIMIT == 16 << 20
 

@@ -1,76 +1,26 @@
 """A daemon that nobody asked for by name ends when nobody needs it, and never with a drop."""
 
-import time
+import asyncio
 
-import pytest
-
-from bench.process_fixture import ProcessFixture
-from rig.errors import RigError
-from rig.link.messages import Phase
-from rig.session.store import Session
-from tests.cli.lab import log_of
-from tests.daemon.at_work import ended
-from tests.waiting import PATIENCE_S, until
-
-IDLE_S = 0.4
-ALONE = f"no client for {IDLE_S:g} s"
+from rig.daemon import server
+from rig.daemon.server import Server
+from tests.tables import cases
+from tests.waiting import PATIENCE_S
 
 
-@pytest.fixture
-def processes():
-    """Have a board and a daemon that ends when it is left alone."""
-    with ProcessFixture(runs=2, seed=3) as made:
-        made.start_daemon("--idle-timeout", str(IDLE_S))
-        yield made
-
-
-@pytest.fixture
-def client(processes):
-    """Connect clients; on a busy machine a daemon may have ended before one was ready to."""
-    made = []
-
-    def connect(name):
-        while True:
-            try:
-                made.append(processes.client(name))
-            except RigError:
-                assert processes.daemon.wait(PATIENCE_S) == 0
-                processes.kill(processes.daemon)
-                processes.start_daemon("--idle-timeout", str(IDLE_S))
-            else:
-                return made[-1]
-
-    yield connect
-    for one in made:
-        one.close()
-
-
-def test_it_stays_while_a_client_is_there_and_disarms_before_it_ends(processes, driver):
-    time.sleep(3 * IDLE_S)
-    assert driver.call("renew") == {"disk_s": 0.0}
-    driver.arm(1, 1)
-    driver.close()
-    assert ALONE in ended(processes)
-    assert not processes.socket.exists()
-    processes.await_phase(Phase.IDLE)
-    assert log_of(processes.session) == {1: [(1, "armed"), (1, "interrupted")]}
-
-
-def test_a_drop_that_only_the_board_has_is_waited_for(processes, driver):
-    driver.fire(driver.arm(1, 1))
-    processes.hand("pull 2")
-    driver.close()
-    ended(processes)
-    assert log_of(processes.session) == {1: [(1, "armed"), (1, "fired"), (1, "recorded")]}
-
-
-def test_it_stays_until_the_disk_has_taken_everything(processes, driver):
-    processes.fill_disk()
-    until(lambda: driver.call("subscribe")["state"]["phase"] == "trouble")  # until then all is kept
-    driver.close()
-    time.sleep(4 * IDLE_S)
-    assert processes.daemon.poll() is None
-    processes.free_disk()
-    assert "\ntrouble: " in ended(processes)
-    with Session.open(processes.session, readonly=True) as session:
-        assert list(session.pings())
+@cases
+async def test_it_stays_while_anything_of_this_is_shown(tmp_path, monkeypatch, caplog, shown):
+    caplog.set_level("INFO", "rig.daemon.server")
+    monkeypatch.setattr(server, "_LOOK_S", 1e-3)
+    alone, ready = (
+        Server("sim://", tmp_path / "of a user" / "rig.sock", idle_s=0.0),
+        asyncio.Event(),
+    )
+    alone.published.set(**shown)
+    serving = asyncio.create_task(alone.run(ready.set))
+    await ready.wait()
+    await asyncio.sleep(0.1)
+    assert not serving.done()
+    alone.published.set(clients=0, drop={"state": "recorded"}, error=None, phase="idle")
+    await asyncio.wait_for(serving, PATIENCE_S)
+    assert caplog.messages[-1] == "no client for 0 s; nothing armed, falling or unsaved"

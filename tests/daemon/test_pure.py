@@ -14,7 +14,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bench.process_fixture import FENCE
 from rig import errors
 from rig.daemon import rpc
 from rig.daemon.client import Client, Line
@@ -23,16 +22,16 @@ from rig.daemon.listener import Door
 from rig.daemon.replica import Replica
 from rig.daemon.worker import Worker
 from rig.link import messages as wire
+from rig.link.assembly import Assembly
 from rig.link.messages import HOST_SILENCE_MS, DisarmReason, RefusalReason
 from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Incoming
 from rig.reasons import rig_error
-from rig.recorder.controller import Controller
 from rig.recorder.feed import StateFeed
 from rig.recorder.interrupts import Interrupts
-from rig.recorder.published import EDGES_LIMIT, PublishedState
+from rig.recorder.published import PublishedState
 from rig.recorder.recorder import NullSink
-from rig.records import Drop, Edge, Job
+from rig.records import Job
 from rig.session.schema import RunState
 from tests.refusals import refused
 from tests.tables import cases, read_table
@@ -102,6 +101,39 @@ def test_who_is_no_daemon_is_told_so(tmp_path, told, why):
             line.recv(1 << 10)
             line.sendall(told.encode("latin-1"))
         refused(errors.DeviceError, why, client.result)
+
+
+def test_a_line_gives_each_request_its_answer_and_all_that_is_open_one_end(tmp_path):
+    """Answers in any order, to nobody and to who waits no more; nothing stays of it at the end."""
+    tmp_path.chmod(0o700)
+    told, now, place = [], {"n": 1, "state": {}}, tmp_path / "rig.sock"
+    with socket.socket(socket.AF_UNIX) as other, ThreadPoolExecutor(1) as pool:
+        other.bind(str(place))
+        other.listen()
+        note = lambda *what: told.append(what)  # noqa: E731
+        client = pool.submit(Line, place, "t", note, note)
+        near, _ = other.accept()
+        with near, near.makefile("rb") as lines:
+            hello = {"jsonrpc": "2.0", "method": "hello", "params": {"api": 1, "client": "t"}}
+            assert json.loads(lines.readline()) == hello | {"id": 1}
+            near.sendall(rpc.answer(1, {"pid": 7}))
+            line = client.result(PATIENCE_S)
+            assert line.daemon == {"pid": 7}
+            first, left, second, unanswered = (line.ask("stop", reason="r") for _ in range(4))
+            refused(errors.DeviceError, "", Client(line).call, "wait", patience=0.1)
+            assert all(lines.readline() for _ in range(5))
+            left.cancel()
+            answers = rpc.answer(4, now), rpc.answer(99, {}), rpc.answer(3, {})
+            change, no = rpc.request("change", {"n": 2}, None), rpc.failure(2, ERRORS[0])
+            near.sendall(b"".join((*answers, change, no)))
+            refused(DeviceRefusedError, "gates 0, 2 are blocked", first.result, PATIENCE_S)
+            assert (second.result(0.0), told) == (now, [("snapshot", now), ("change", {"n": 2})])
+            near.shutdown(socket.SHUT_WR)
+            assert lines.read() == b"", "it hangs up too"
+            for answer in (unanswered, line.ask("renew")):
+                refused(errors.DeviceError, "it hung up", answer.result, PATIENCE_S)
+            line.close()
+    assert told[2:] == [()]
 
 
 def test_one_client_has_control_until_it_is_not_heard():
@@ -179,9 +211,9 @@ def test_a_change_that_changes_nothing_is_none():
 
 def test_the_edges_of_an_endless_drop_do_not_fill_the_memory():
     published = PublishedState()
-    for first in range(0, 2 * EDGES_LIMIT, 1 << 12):
+    for first in range(0, 1 << 17, 1 << 12):
         published.edges((tick, 0, 1) for tick in range(first, first + (1 << 12)))
-    assert len(published.snapshot()["state"]["edges"]) == EDGES_LIMIT
+    assert len(published.snapshot()["state"]["edges"]) == 1 << 16
 
 
 def test_a_replica_does_not_swallow_a_gap():
@@ -230,29 +262,43 @@ def test_a_signal_waits_only_while_something_falls():
     refused(KeyboardInterrupt, "", interrupts._note)
 
 
-def test_what_falls_is_shown_while_it_falls_and_frames_out_of_order_are_not():
+PIECES = st.lists(
+    st.tuples(
+        st.lists(st.tuples(st.integers(0, 999), st.integers(0, 15)), min_size=1, max_size=3),
+        st.booleans(),
+    ),
+    max_size=6,
+)
+"""Of a fall: the events of each frame, and whether it arrives."""
+
+
+@given(st.integers(0, 2**32 - 1), st.lists(PIECES, min_size=2, max_size=2))
+def test_what_is_shown_of_a_fall_is_what_its_record_will_have(fire_tick, falls):
+    """As far as frames arrive; one that comes again shows nothing again."""
     published = PublishedState()
-    published.plan([{"run": 1}])
-    feed, label = StateFeed(published), wire.pack_label(1, 1)
-    feed.state(Job(1, 1), RunState.ARMED, ())
-    frames = [(0, (110, 1)), (3, (140, 1), (150, 3)), (1, (120, 0))]
-    events = [wire.EventsFrame(label, at, wire.pack_events(of)) for at, *of in frames]
-    for message in (events[0], wire.Fired(100), *events):
-        feed.know(Incoming(0, 0, message))
-    drop = published.get("drop")
-    assert (drop["state"], drop["fire_tick"], drop["events"]) == ("fired", 100, 5)
-    assert published.snapshot()["state"]["edges"] == [(10, 0, 1), (50, 1, 1)]
-    assert (published.get("gates"), published.get("phase")) == ({"blocked": 3}, "recording")
-    feed.show_drop(Drop(1, 1, 1000, (Edge(10, 0, True), Edge(20, 0, False)), 100))
-    assert published.get("phase") == "idle"
-    assert published.snapshot()["state"]["edges"] == [(10, 0, 1), (20, 0, 0)]
-    feed.state(Job(1, 2), RunState.ARMED, ())
-    assert published.snapshot()["state"]["edges"] == []
-    feed.know(Incoming(0, 0, wire.Disarmed(1, DisarmReason.TIMEOUT)))
-    assert published.get("phase") == "idle"
-    feed.state(Job(1, 2), RunState.INTERRUPTED, ())
-    state = published.snapshot()["state"]
-    assert state["drop"]["state"] == state["runs"][0]["state"] == "interrupted"
+    feed = StateFeed(published)
+    for attempt, pieces in enumerate(falls, 1):
+        job, label, first, seen = Job(1, attempt), wire.pack_label(1, attempt), 0, 0
+        record = Assembly(label)
+        record.fire_tick = fire_tick
+        feed.state(job, RunState.ARMED, ())
+        feed.know(Incoming(0, 0, wire.Fired(fire_tick)))
+        for events, arrives in pieces:
+            ticks = [((fire_tick + tick) % 2**32, state) for tick, state in events]
+            frame = wire.EventsFrame(label, first, wire.pack_events(ticks))
+            first += len(events)
+            if arrives:
+                record.add(frame)
+                feed.know(Incoming(0, 0, frame))
+                feed.know(Incoming(0, 0, frame))
+                seen = first
+        drop = record.drop(1000)
+        edges = [(tick, channel, int(blocked)) for tick, channel, blocked in drop.edges]
+        state = published.snapshot()["state"]
+        shown = {**job._asdict(), "state": "fired", "tick_hz": 0, "fire_tick": fire_tick}
+        assert (state["edges"], state["drop"]) == (edges, shown | {"events": seen})
+        feed.show_drop(drop)
+        assert published.snapshot()["state"]["edges"] == edges
 
 
 def test_what_has_no_session_keeps_nothing_and_can_arm_nothing():
@@ -275,18 +321,3 @@ def test_a_client_gives_signs_of_life_by_itself_unless_it_is_armed(deeds, signs)
         getattr(client, method)(*values)
     client._renew()
     assert [asked.args[0] for asked in client.line.ask.mock_calls].count("renew") == signs
-
-
-def test_a_session_is_shown_until_it_is_closed_and_blind_until_it_is_not(tmp_path):
-    protocol = tmp_path / "fence.yaml"
-    protocol.write_text(FENCE.replace("RUNS", "1") + "blind: true\n", "utf-8")
-    rig = Controller("sim://", PublishedState())
-    rig.open_session(protocol, tmp_path / "session")
-    about = rig.published.get("session")
-    assert (about["path"], about["blind"]) == (str(tmp_path / "session"), True)
-    rig.unblind()
-    assert rig.session.unblinded
-    assert rig.published.get("session") == about | {"blind": False}
-    rig.close()
-    state = rig.published.snapshot()["state"]
-    assert (state["session"], state["runs"], state["link"]["state"]) == (None, [], "closed")

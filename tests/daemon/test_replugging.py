@@ -2,6 +2,8 @@
 
 import os
 from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -10,12 +12,14 @@ from bench.process_fixture import ProcessFixture
 from rig.errors import DeviceError
 from rig.link.messages import Phase
 from rig.link.port import BAUDRATE
+from rig.recorder.board_locator import BoardLocator
 from rig.recorder.controller import Controller
 from rig.recorder.published import PublishedState
 from rig.session.store import Session
 from tests.daemon.at_work import let_fall, working
 from tests.daemon.far_port import FarPort
 from tests.flash.pty_board import info
+from tests.link.talk import IDENTITY
 from tests.refusals import refused
 from tests.tables import cases
 from tests.waiting import until
@@ -53,24 +57,30 @@ def test_a_board_is_found_at_another_port_with_the_drop_it_holds(usb):
 
 
 @cases
-def test_another_board_where_it_was_is_not_taken_for_it(usb, numbers, other_by):
-    with ProcessFixture(1, seed=1) as processes, ProcessFixture(1, seed=2) as other:
-        usb |= {processes.port: numbers[0]}
-        with working(processes) as (worker, ask):
-            let_fall(ask)
-            until(lambda: worker.published.get("drop")["state"] == "recorded")
-            processes.hand("pull 60")
-            until(lambda: worker.published.get("link")["state"] == "down")
-            usb[processes.port] = numbers[1]
-            processes.port.symlink_to(other.port)
-            until(lambda: "another board" in str(worker.published.get("error")))
-            assert other_by in worker.published.get("error")["message"]
-            assert "give the same rig run command again" in worker.published.get("error")["hint"]
-            refused(DeviceError, "no connection", ask, lambda controller: controller.arm(2, 1))
-            # Whoever means it says so by giving the command again.
-            ask(lambda controller: controller.open_session(str(other.protocol), str(other.session)))
-            assert worker.published.get("link")["state"] == "up"
-        assert [seen["phase"] for seen in other.happened() if "phase" in seen] == []
+def test_a_board_is_taken_for_itself_wherever_it_is(usb, tmp_path, course):
+    locator = BoardLocator(str(tmp_path / "port"))
+
+    def there(numbers):
+        usb.clear()
+        usb.update({tmp_path / name: number for name, number in numbers.items()})
+        for link in tmp_path.iterdir():
+            link.unlink()
+        for link in usb:
+            link.touch()
+
+    deeds = {
+        "there": there,
+        "bound": lambda bound: setattr(locator, "bound", bound),
+        "seek": locator.seek,
+        "look": lambda _: Path(locator.look()).name,
+        "meet": lambda number: locator.meet(replace(IDENTITY, unique_id=bytes([number]))),
+    }
+    for deed, value, came in course:
+        try:
+            told = deeds[deed](value)
+        except DeviceError as error:
+            told = error.message.replace(f"{tmp_path}/", "")
+        assert told == came, (deed, value)
 
 
 def test_the_same_command_finds_it_too_when_nothing_is_where_it_was(usb):

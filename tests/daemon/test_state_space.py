@@ -14,7 +14,6 @@ from unittest.mock import Mock
 
 import pytest
 
-from rig.daemon.worker import STALL_S
 from rig.errors import ControlError, SessionError, StoppedError
 from rig.link.messages import TEST_RUN, Phase, RefusalReason, pack_label
 from rig.recorder.controller import Controller
@@ -115,10 +114,10 @@ def test_nothing_falls_unarmed_is_lost_or_waits_for_ever(folder, monkeypatch):
     assert any(path[-1:] == (("accept", None),) for path in found.values())
 
 
-def seen_at_answer(box, work, look, **options):
+def seen_at_answer(box, work, look, *, writes=True):
     """Have a client ask for work; its outcome, and what there is to see when that is known."""
     seen = []
-    outcome = box.worker.submit(work, "A", **options)
+    outcome = box.worker.submit(work, "A", writes=writes)
     outcome.add_done_callback(lambda _: seen.append(look()))
     box.turned()
     return outcome, *seen
@@ -130,14 +129,7 @@ def box(tmp_path, monkeypatch):
         yield box
 
 
-def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(box):
-    box.arm()
-    assert box.worker.published.get("phase") == "armed"
-    line = box.line
-    box.worker.controller.close()
-    assert (box.phase, line.is_open) == (Phase.IDLE, False)
-    box.kill()
-    box.resume()
+def test_whoever_looks_on_leaves_a_drop_on_the_board(box):
     box.arm()
     box.trouble = Trouble("killed", "written", 2)  # FIRE, behind the look at what it does
     box.fire_latest()
@@ -152,61 +144,16 @@ def test_who_ends_leaves_nothing_armed_and_a_drop_on_the_board(box):
     box.ends_well()
 
 
-def test_a_drop_is_shown_with_as_many_events_as_its_certificate_has(box):
-    box.board.lab.drop = lambda _label: [(0.1, 0, True), (0.1, 1, True), (0.2, 0, False)]
-    token = box.arm()
-    box.asked(lambda c: c.fire(token))
-    assert box.worker.published.get("drop")["events"] == 2
-    assert len(box.worker.published.snapshot()["state"]["edges"]) == 3
-
-
 def test_whoever_leaves_once_it_is_let_go_has_it_recorded_whole(box):
     token = box.arm()
     box.wanted = box.tokens[token]
-    box.worker.submit(lambda c: c.fire(token), "A")
+    box.worker.submit(lambda c: c.fire(token), "A", writes=True)
     box.worker._do(box.worker._jobs.get_nowait())
     box.lease.release("A")
     box.turned()
     drop = box.worker.controller.session.drop(1, 1)
     assert (len(drop.edges), drop.faults) == (8, ()), "two rods at two gates"
     assert drop.certificate.pulse_ticks / drop.tick_hz == pytest.approx(0.08, rel=0.01)
-
-
-def test_a_worker_with_nothing_to_do_rests(box):
-    box.turned = Mock(wraps=box.turned)
-    box.passed(3.0)
-    assert 3 <= box.turned.call_count < 60
-
-
-def test_what_gates_see_is_shown_though_nobody_is_in_control(box):
-    box.lease.release("A")
-    box.worker.published.watched = True
-    box.board.touch(1)
-    box.passed(1.0, client="")
-    assert box.worker.published.get("gates") == {"blocked": 1}
-
-
-def test_a_test_of_the_release_tells_what_was_seen_of_it(box):
-    """It is watched for half a second behind the pulse, and stands beside the drop before it."""
-    box.arm()
-    box.fire_latest()
-    box.passed(1.0)
-    box.board.lab.drop = lambda _label: [(0.2, 1, True), (0.579, 1, False), (0.5805, 0, True)]
-    box.board.sense(0.012)
-    seen, phase = box.asked(lambda c: (c.test_release(), c.published.get("phase")))
-    assert (seen["edges"], seen["gates"], seen["faults"], phase) == (2, [1], [], "idle")
-    assert seen["release_sense_s"] == pytest.approx(0.012, rel=0.01)
-    assert box.worker.published.get("drop")["state"] == "recorded"
-
-
-def test_a_wait_lasts_as_long_as_asked_and_what_it_measures_is_on_the_disk(box):
-    def waited(controller):
-        begun_s = box.now()
-        controller.wait(1.5)
-        trip_s = controller.recorder.statistics()["round_trip_s"]
-        return box.now() - begun_s, trip_s, controller.session.pending
-
-    assert box.asked(waited) == pytest.approx((1.5, 0.005, 0), abs=0.005)
 
 
 def test_a_test_of_the_release_needs_control_a_session_nothing_armed_and_a_closed_stop(box):
@@ -228,30 +175,18 @@ def test_a_test_of_the_release_needs_control_a_session_nothing_armed_and_a_close
     assert box.fell == []
 
 
-@pytest.mark.parametrize("deeds", [1, 2])
-def test_a_stop_ends_a_test_of_the_release(box, monkeypatch, deeds):
-    """Behind ARM, and behind FIRE; also where no ABORT goes past the worker."""
-    monkeypatch.setattr(box.worker, "_abort_past", lambda: False)
-    box.board.lab.drop = Mock(return_value=[])
-    box.trouble = Trouble("stopped", "written", deeds)
-    assert isinstance(box.asked(lambda c: c.test_release()), StoppedError)
-    assert box.board.lab.drop.called == (deeds == 2)
-    assert (box.board.outputs(), box.phase) == (0, Phase.IDLE)
-    assert box.worker.published.get("release_test") is None
-    box.passed(1.0)
-    assert isinstance(box.arm(), int), "nothing is left behind that forbids it"
-
-
 def test_a_test_of_the_release_that_is_not_whole_is_shown(box):
     box.board.lab.drop = lambda _: box.board.stop(True) or []
     assert "stop" in box.asked(lambda c: c.test_release())["faults"][0]
 
 
 def test_what_was_heard_of_a_port_that_is_gone_is_on_the_disk(box):
+    line = box.line
     box.pull()
     box.asked(lambda c: c.recorder.look())
     link = box.worker.published.get("link")
     assert (link["state"], link["retry_s"]) == ("down", 0.25)
+    assert not line.is_open
     assert box.worker.controller.session.pending == 0
 
 
@@ -277,13 +212,40 @@ def test_who_is_held_up_says_by_what_and_whether_anything_is_armed(box, monkeypa
             trouble = worker.stall()
         return trouble and trouble.reasons[0].code
 
-    assert [stalled(2.0 * STALL_S, disk_s) for disk_s in (0.0, 1.0)] == ["held_up", "disk_slow"]
-    assert [stalled(0.5 * STALL_S, disk_s) for disk_s in (0.0, 1.0)] == [None, None]
+    assert [stalled(1.01, disk_s) for disk_s in (0.0, 1.0)] == ["held_up", "disk_slow"]
+    assert [stalled(0.99, disk_s) for disk_s in (0.0, 1.0)] == [None, None]
     box.arm()
-    armed = [stalled(2.0 * STALL_S, disk_s) for disk_s in (0.0, 1.0)]
+    armed = [stalled(1.01, disk_s) for disk_s in (0.0, 1.0)]
     assert armed == ["held_up_armed", "disk_slow_armed"]
     box.turned()
-    assert box.asked(lambda _: box.clock.sleep(1.5 * STALL_S) or worker.stall()) is not None
+    assert box.asked(lambda _: box.clock.sleep(1.01) or worker.stall()) is not None
+    assert box.asked(lambda c: c.wait(1.9) or worker.stall()) is None, "while it goes on"
+    worker.controller.close()
+    assert [stalled(1.01, disk_s) for disk_s in (0.0, 1.0)] == [None, "disk_slow"]
+
+
+def test_how_long_the_disk_is_at_a_write_is_known_while_it_is(box):
+    seen = []
+    box.looked = lambda _: seen.append(box.worker.disk_s())
+    box.trouble = Trouble("looked", "commit")
+    box.asked(lambda c: c.wait(0.1))
+    assert seen[0] > 0.0 == box.worker.disk_s()
+
+
+def test_a_worker_that_ends_disarms_and_answers_whatever_waits(box):
+    def ask(_=None):
+        asked.append(worker.submit(lambda _: None, "A", writes=False))
+
+    box.arm()
+    worker, asked = box.worker, []
+    ask()
+    box.asking, box.trouble = ask, Trouble("asking", "write")  # ABORT
+    worker.end()
+    worker._run()
+    said = [str(answer.exception(0.0)).partition("\n")[0] for answer in asked]
+    assert said == ["the daemon ended", "the daemon ends"]
+    assert (box.phase, worker.over.result(0.0)) == (Phase.IDLE, None)
+    assert box.on_disk("state", (1, 1)) == ["armed", "interrupted"]
 
 
 def test_what_fails_is_in_the_state_before_it_is_answered(box):
@@ -292,6 +254,14 @@ def test_what_fails_is_in_the_state_before_it_is_answered(box):
     _, error = seen_at_answer(box, fail, lambda: box.worker.published.get("error"))
     assert error["message"] == "the disk is full"
     assert box.board._controller.phase is not Phase.ARMED, "what cannot be kept must not fall"
+
+
+def test_what_cannot_be_kept_is_not_asked_for_but_all_is_switched_off(box, monkeypatch):
+    box.arm()
+    full = Mock(side_effect=SessionError("the disk is full"))
+    monkeypatch.setattr(box.worker.controller.session, "log_bytes", full)
+    assert isinstance(box.asked(lambda c: c.wait(0.1)), SessionError)
+    assert box.board._controller.phase is Phase.IDLE
 
 
 def test_what_waits_for_the_disk_is_said_once_and_only_where_anything_does(box):
@@ -303,15 +273,6 @@ def test_what_waits_for_the_disk_is_said_once_and_only_where_anything_does(box):
     assert len(full.reasons) == 1
 
 
-def test_a_board_is_watched_without_a_session_and_its_port_is_kept_for_the_next(box):
-    box.worker.controller.close()
-    box.passed(1.5)
-    line = box.line
-    assert line.is_open
-    box.resume()
-    assert box.line is line
-
-
 def test_what_the_board_holds_otherwise_than_the_session_is_not_forgotten(box):
     box.arm()
     box.worker.controller.recorder.device.acknowledge = lambda *_: box.killed()
@@ -321,12 +282,29 @@ def test_what_the_board_holds_otherwise_than_the_session_is_not_forgotten(box):
     assert box.phase is Phase.HOLDING
 
 
-def test_stop_answers_what_waits(box):
-    box.trouble = Trouble("stopped", "written")  # ARM
-    assert isinstance(box.arm(), StoppedError)
-    waiting = [box.worker.submit(lambda c: c.opened, "A") for _ in range(2)]
-    box.stop()
-    assert all(isinstance(one.exception(timeout=0.0), StoppedError) for one in waiting)
+def test_a_stop_after_a_release_that_was_not_answered_keeps_what_fell(box):
+    def silent(_):
+        box.deaf_until_ns = box.clock.now_ns() + 200_000_000
+        box.trouble = Trouble("stopped", "write")  # FIRE once more
+
+    box.arm()
+    box.silent, box.trouble = silent, Trouble("silent", "written", 2)
+    assert isinstance(box.fire_latest(), StoppedError)
+    assert not box.board.outputs()
+    box.passed(6.0)
+    assert box.on_disk("state", (1, 1)) == ["armed", "fired", "recorded"]
+
+
+def test_a_stop_that_comes_while_all_is_switched_off_is_kept(box):
+    late = []
+    box.arm()
+    box.lease.release("A")
+    box.stopping = lambda _: late.append(box.worker.stop("a second client"))
+    box.trouble = Trouble("stopping", "write")  # ABORT
+    box.turned()
+    box.turned()
+    assert late[0].result(0.0) is None
+    assert box.worker._attended.is_set(), "no ABORT follows that could end what is armed anew"
 
 
 def test_a_session_that_is_opened_ends_the_trouble_of_the_one_before(box):
@@ -344,6 +322,7 @@ def test_stop_ends_the_search_for_a_board_that_does_not_answer(box):
     outcome, ended_s = seen_at_answer(box, lambda c: c.connect(), box.now)
     assert isinstance(outcome.exception(), StoppedError)
     assert ended_s - begun_s < 3.0
+    assert not box.line.is_open
 
 
 @pytest.mark.slow

@@ -3,10 +3,7 @@
 import sqlite3
 from contextlib import closing, suppress
 from pathlib import Path
-from types import SimpleNamespace
 
-from rig.daemon.lease import Lease
-from rig.daemon.worker import Worker
 from rig.errors import DeviceTimeoutError
 from rig.link.messages import CODES, Abort, Disarmed, DisarmReason, Done, Phase
 from rig.recorder.controller import Controller
@@ -46,27 +43,6 @@ def test_stop_goes_past_a_disk_that_does_not_answer(processes, driver, client):
     until(lambda: said("tx", CODES[Abort], 255))
     until(lambda: said("rx", CODES[Done], 255))
     assert drops_of(processes.session) == []
-
-
-def test_a_stop_between_the_look_and_the_answer_is_kept(monkeypatch):
-    worker = Worker("sim://", PublishedState(), Lease())  # never started: this thread is its thread
-    worker.controller.recorder = SimpleNamespace(armed=(1, 1))
-    late = []
-
-    def held(self):
-        if not late:
-            late.append(self.stop("a second client"))
-        return True
-
-    monkeypatch.setattr(Worker, "_held", property(held))
-    worker._attend()
-    assert not late[0].done()
-    stopped = []
-    monkeypatch.setattr(worker.controller, "stop", stopped.append)
-    worker._attend()
-    assert stopped == ["a second client"]
-    assert late[0].done()
-    assert worker._attended.is_set(), "no ABORT follows that could end what is armed anew"
 
 
 def test_a_board_that_disarms_itself_as_soon_as_it_is_armed_is_heard(tmp_path, monkeypatch):

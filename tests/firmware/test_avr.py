@@ -66,6 +66,13 @@ class AvrConformance(DeviceConformance):
         device.collect(LABEL)
         assert seen(1.1) == {True, False}
 
+    def test_a_gate_that_only_flickers_after_arming_forbids_fire(self, bench, device):
+        token = arm(device)
+        bench.now().touch(2)
+        bench.clock().sleep(2e-7)
+        bench.now().touch(0)
+        assert self.refused(wire.RefusalReason.GATE_UNSTEADY, device.fire, token).detail == 0
+
     @pytest.mark.parametrize("byte", [0x00, 0x5A, 0xFF])
     def test_memory_that_was_lost_while_the_power_was_low_is_not_believed(self, bench, byte):
         Wire(bench).drop()
@@ -255,6 +262,7 @@ EACH = pytest.mark.parametrize("board", BOARDS)
 def test_boards_whose_memory_was_cleared_get_names_of_their_own(board):
     names = [stand_of(board, named=b"", waits=waits).identity.unique_id for waits in (0, 997, 5000)]
     assert len({*names, bytes(8)}) == 4
+    assert all(len({*byte}) > 1 for byte in zip(*names, strict=True))
 
 
 @EACH

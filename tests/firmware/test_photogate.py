@@ -12,6 +12,7 @@ from tests.firmware.toolchain import FIRMWARE, need
 from tests.model.chains import decades
 from tests.programs import run_program
 from tests.refusals import refused
+from tests.tables import cases
 
 NAMED = {"distance_m": 0.06, "slit_m": 0.5e-3, "led": "TSAL6100", "detector": "BPW85C"}
 DECK = Path(__file__).with_name("photogate.cir").read_text("ascii")
@@ -44,15 +45,11 @@ def test_the_threshold_is_at_half_light_whatever_the_supply_of_the_board(tmp_pat
     assert 0.6 * told < light - dark < 1.4 * told
 
 
-def test_a_gate_of_every_pair_is_lit_at_half_of_what_its_led_bears():
-    gate = photogate.design_photogate(**NAMED)
-    assert gate["load resistor, Ω"] == 4700
+@cases
+def test_a_gate_of_these_parts_has_these_figures(distance_m, slit_m, led, detector, figures):
+    gate = photogate.design_photogate(distance_m, slit_m, led, detector)
+    assert [*gate.values()] == pytest.approx(figures, rel=1e-9)
     assert gate["LED current, weakest parts, mA"] <= 50
-    series = gate["LED resistor, Ω"] + gate["LED trimmer, Ω, at least"]
-    assert (5 - photogate.LED_V) / series * 1e3 <= gate["LED current, strongest parts, mA"]
-    assert (5 - photogate.LED_V) / gate["LED resistor, Ω"] * 1e3 >= 50
-    twice = photogate.design_photogate(**{**NAMED, "distance_m": 0.085})
-    assert twice["load resistor, Ω"] == 10_000
 
 
 def test_too_little_light_is_said():

@@ -82,12 +82,6 @@ class OutputSuite(Suite):
         assert bench.outputs() == 0
         assert later(bench, 0.02) == 0
 
-    def test_what_disarms_itself_never_was_on(self, bench, device):
-        arm(device, timeout_ms=100)
-        for _ in range(4):
-            assert later(bench, 0.05) == 0
-        assert device.status().phase is wire.Phase.IDLE
-
 
 REQUESTS = wire.Status(), wire.Ping(), wire.Fire(0), wire.Done()
 ANEW = [(request, range(2, 7)) for request in REQUESTS]
@@ -107,6 +101,16 @@ class SilenceSuite(Suite):
             bench.clock().sleep(0.07)
             line.ask(request_, seq)
         assert isinstance(line.ask(wire.Fire(token), 8), wire.Fired)
+
+    @pytest.mark.parametrize(("timeout_ms", "ends_ms"), [(1, 1), (100, 100), (65_535, 250)])
+    def test_it_disarms_when_it_says_it_will(self, bench, device, timeout_ms, ends_ms):
+        armed_ns = bench.clock().now_ns()
+        arm(device, timeout_ms=timeout_ms, record_ms=65_535)
+        said = device.wait_for(1.0, lambda got: isinstance(got.message, wire.Disarmed))
+        silent = timeout_ms > ends_ms
+        assert said.reason == (wire.DisarmReason.HOST_SILENT if silent else 1)
+        assert ends_ms <= (bench.clock().now_ns() - armed_ns) * 1e-6 < ends_ms + 25
+        assert bench.outputs() == 0
 
     @pytest.mark.parametrize("frame", ["bad CRC", "seq 0"])
     def test_what_is_no_request_is_silence(self, bench, armed, frame):

@@ -14,6 +14,9 @@ from rig.records import Drop
 from tests.link.bench import GATES, LABEL, Bench
 
 FENCE = Path(__file__).parents[2] / "protocols/picket-fence.yaml"
+IDENTITY = wire.Identity(
+    2, "mega2560", "1.0", bytes(8), 16_000_000, 16, 2, 500_000, 1024, 0, 256, ""
+)
 ORDER = {"gates": GATES, "release": 1, "pulse_us": 20_000, "timeout_ms": 5000, "record_ms": 150}
 
 

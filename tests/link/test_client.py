@@ -3,35 +3,36 @@
 import socket
 import sys
 from dataclasses import replace
+from itertools import groupby
 
 import pytest
 import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.boards import LONGEST_RECORD_MS
 from rig.clock.host import SystemClock
 from rig.errors import DeviceError, DeviceTimeoutError
 from rig.link import messages as wire
 from rig.link.client import Device
 from rig.link.exchange import STRANGE_BYTES
 from rig.link.frames import Decoder, Frame, encode
-from rig.link.port import open_port, port_clock
+from rig.link.port import check_url, open_port, port_clock
 from rig.link.refusals import DeviceRefusedError
 from rig.link.transcript import Incoming, Restart, Transcript
 from rig.reasons import make_reason
-from rig.records import ClockSample
+from rig.records import ClockSample, Drop
 from sim.clock import VirtualClock
 from tests.daemon.far_port import FarPort
 from tests.flash.pty_board import PtyBoard
 from tests.link.bench import LABEL, ScriptedLab, falling_rods
 from tests.link.strategies import MESSAGES
-from tests.link.talk import arm, connected, framed
+from tests.link.talk import IDENTITY, arm, connected, framed
 from tests.refusals import refused
 from tests.tables import cases
 from tests.waiting import until
 
 SMALL = st.integers(0, 3)
+ALWAYS = lambda: True  # noqa: E731
 
 
 class FakePort:
@@ -70,15 +71,29 @@ def clock() -> VirtualClock:
     return VirtualClock()
 
 
-IDENTITY = wire.Identity(
-    2, "mega2560", "1.0", bytes(8), 16_000_000, 16, 2, 500_000, 1024, 0, 256, ""
-)
+def spoken(data: bytes) -> str:
+    """Name what a client writes: a request, or what is no frame."""
+    (name,) = [wire.TABLE[frame.type].__name__ for frame in Decoder().feed(data)] or [data.hex()]
+    return name
 
 
-def test_the_first_byte_is_a_delimiter(clock):
-    port = FakePort(clock, {wire.Identify: [IDENTITY]})
-    assert Device(port, clock).connect() == IDENTITY
-    assert port.written[0] == b"\0"
+@cases
+def test_each_talk_takes_its_course(clock, ask, answers, said, told, counted):
+    """What is written how often, when first and when last, ms; what comes of it, and the counts."""
+    port, written = FakePort(clock, {}), []
+    for kind, messages in answers.items():
+        port.answers[getattr(wire, kind)] = [getattr(wire, name)(*of) for name, *of in messages]
+    device = Device(port, clock, lambda *chunk: written.append(chunk))
+    method, *values = ask
+    try:
+        came = getattr(device, method)(*(ALWAYS if one == "stop" else one for one in values))
+        came = [fault.code for fault in came.faults] if isinstance(came, Drop) else str(came)
+    except DeviceError as error:
+        came = error.message
+    talk = [(spoken(data), ns // 10**6) for way, ns, data in written if way == "tx"]
+    groups = [(name, [ms for _, ms in of]) for name, of in groupby(talk, lambda one: one[0])]
+    assert [[name, len(ms), ms[0], ms[-1]] for name, ms in groups] == said
+    assert (came, [*device.statistics().values()]) == (told, counted)
 
 
 class Captive(FakePort):
@@ -103,49 +118,6 @@ def test_a_boot_loader_is_left_in_peace_until_it_lets_go(clock):
     assert Device(Captive(clock, {}), clock).connect() == IDENTITY
 
 
-@pytest.mark.parametrize(("tries", "asked"), [(40, 4), (4, 4), (2, 2)])
-def test_who_never_answers_is_asked_a_few_times_whatever_patience_a_bad_line_needs(
-    clock, tries, asked
-):
-    """Each time: at first, behind what a boot loader is told, and when it should have let go."""
-    port = FakePort(clock, {})
-    one = Device(port, clock, tries=tries)
-    assert "cable" in refused(DeviceTimeoutError, "did not answer Identify", one.connect).hint
-    frames = [frame for data in port.written for frame in Decoder().feed(data)]
-    assert [frame.type for frame in frames] == [wire.CODES[wire.Identify]] * 3 * asked
-
-
-def test_repeats_have_the_same_seq_and_back_off(clock):
-    port = FakePort(clock, {})
-    refused(DeviceTimeoutError, "did not answer Ping", Device(port, clock, tries=6).ping)
-    assert len(port.written) == 6
-    assert len(set(port.written)) == 1
-    assert 1.5 < clock.now_ns() * 1e-9 < 3
-
-
-def test_what_is_asked_and_asked_again_is_counted(clock):
-    port = FakePort(clock, {wire.Ping: [wire.Pong(1)]})
-    one = Device(port, clock, tries=3)
-    one.ping()
-    refused(DeviceTimeoutError, "", one.status)
-    counted = one.statistics()
-    assert (counted["requests"], counted["repeats"]) == (2, 2)
-    assert counted["tx_bytes"] == sum(map(len, port.written))
-    assert counted["rx_bytes"] == len(encode(Frame(wire.CODES[wire.Pong], 1, 1, bytes(4))))
-
-
-@pytest.mark.parametrize(
-    ("ask", "times", "within"), [(Device.abort, 5, 1.0), (lambda board: board.fire(1), 3, 0.8)]
-)
-def test_enough_leave_before_an_armed_board_switches_itself_off(clock, ask, times, within):
-    port, sent = FakePort(clock, {}), []
-    port.write = lambda data: sent.append((clock.now_ns(), data))
-    port.read = lambda size=1: clock.sleep(0.001) or b""
-    refused(DeviceTimeoutError, "", ask, Device(port, clock))
-    assert sent[times - 1][0] < within * wire.HOST_SILENCE_MS * 1e6
-    assert len({data for _, data in sent}) == 1
-
-
 @pytest.mark.parametrize("noise", [b"\x55" * 4096, bytes(range(256)) * 16, b"\0" * 4096])
 def test_a_flood_from_who_knows_whom_is_ended_after_a_mebibyte(clock, noise):
     port, kept = FakePort(clock, {}), []
@@ -162,11 +134,6 @@ def test_seq_wraps_around_zero(clock):
     for _ in range(300):
         one.ping()
     assert [frame.seq for frame in port.frames] == [n % 254 + 1 for n in range(300)]
-
-
-def test_nonsense_is_said_to_be_nonsense(clock):
-    port = FakePort(clock, {wire.Status: [wire.Pong(1)]})
-    refused(DeviceError, "answered Status with Pong", Device(port, clock).status)
 
 
 @pytest.mark.parametrize("ask", [Device.status, Device.receive, Device.statistics])
@@ -217,11 +184,15 @@ class Liar(FakePort):
         return super().write(data)
 
 
-def test_events_that_do_not_match_the_certificate_are_a_fault(clock):
-    port = Liar(clock, 1, events_frame(0, (150, 1)))
-    drop = Device(port, clock).fetch(1)
-    assert len(port.written) == 3  # certificate, events, events once more
-    assert make_reason("crc_mismatch") in drop.faults
+def test_events_that_do_not_match_their_certificate_are_read_once_more(clock):
+    """As far as the device keeps them."""
+    port = Liar(clock, 3, events_frame(0, (150, 1), (160, 0), (170, 1)))
+    device = Device(port, clock)
+    device.transcript.feed("rx", 0, framed(replace(IDENTITY, capacity=2)))
+    drop = device.fetch(1)
+    asked = [wire.unpack(frame.type, frame.payload) for frame in port.frames]
+    assert [(read.first, read.count) for read in asked] == [(0, 0), (0, 3), (1, 2)]
+    assert (len(drop.edges), drop.faults) == (3, (make_reason("crc_mismatch"),))
 
 
 @pytest.mark.parametrize(
@@ -257,26 +228,6 @@ def test_a_device_that_disarmed_itself_has_a_reason(clock, reason):
     port.answers[wire.Arm] = [wire.Armed(10)]
     token = one.arm(wire.Arm(1, 1, 0, 0, 1, 1))
     refused(DeviceRefusedError, "is not armed", one.fire, token)
-
-
-def test_a_recording_without_end_is_a_time_out(clock):
-    port = FakePort(clock, {wire.Status: [wire.State(wire.Phase.RECORDING, 0, 1, 3)]})
-    refused(DeviceTimeoutError, "never ends", Device(port, clock).collect, 1, timeout=10)
-    assert clock.now_ns() * 1e-9 == pytest.approx(LONGEST_RECORD_MS * 1e-3 + 10, abs=0.5)
-    each_s = LONGEST_RECORD_MS * 1e-3 / len(port.written)
-    assert 0.25 <= each_s < 0.4, "it is asked now and then, and not all the time"
-
-
-def test_after_an_abort_the_certificate_is_asked_for_soon(clock):
-    answers = {
-        wire.Abort: [wire.Done()],
-        wire.Status: [wire.State(wire.Phase.HOLDING, 0, 1, 0)],
-        wire.Read: [certificate(1, 0)],
-    }
-    port = FakePort(clock, answers)
-    drop = Device(port, clock).collect(1, timeout=60, stop=lambda: True)
-    assert drop.certificate.events == 0
-    assert 0.25 <= clock.now_ns() * 1e-9 < 0.4
 
 
 # -- the transcript alone
@@ -328,13 +279,27 @@ def test_arming_again_begins_anew_but_a_repeated_answer_does_not():
     transcript = Transcript()
     order = wire.Arm(1, 0x00FF, 0, 0, 1, 1)
     say(transcript, "tx", order, seq=1)
+    say(transcript, "rx", wire.Disarmed(7, wire.DisarmReason.TIMEOUT))  # answers nothing
     say(transcript, "rx", wire.Armed(9), ack=1)
     say(transcript, "rx", events_frame(0, (110, 1)))
     say(transcript, "rx", wire.Armed(9), ack=1)
-    assert transcript.assembly(1).begun
+    assert (transcript.assembly(1).begun, transcript.assembly(1).gates) == (True, 0x00FF)
     say(transcript, "tx", order, seq=2)
     say(transcript, "rx", wire.Armed(9), ack=2)
     assert not transcript.assembly(1).begun
+
+
+def test_a_restart_is_given_with_all_that_is_known_of_it():
+    """The first, behind the opening of the port, is none: it tells how long the board starts up."""
+    transcript, second = Transcript(), 10**9
+    transcript.feed("tx", second, b"\0")
+    assert len(say(transcript, "rx", wire.Boot(1), ns=2 * second)) == 1
+    say(transcript, "tx", wire.Arm(1, 1, 0, 0, 1, 1), seq=1)
+    say(transcript, "rx", wire.Armed(9), ack=1)
+    say(transcript, "tx", wire.Fire(9), seq=2)
+    say(transcript, "rx", wire.Fired(5), ack=2, ns=5 * second)
+    given = [say(transcript, "rx", wire.Boot(4), ns=at * second)[1] for at in (7, 8)]
+    assert given == [Restart(7 * second, 4, 1, 2.0, 1.0), Restart(8 * second, 4, None, 0.0, 1.0)]
 
 
 def test_half_a_frame_before_a_reconnect_swallows_nothing():
@@ -441,6 +406,7 @@ def test_nothing_listens():
         free.bind(("127.0.0.1", 0))
         number = free.getsockname()[1]
     nobody = f"socket://127.0.0.1:{number}"
+    check_url(nobody)
     assert "HOST:PORT" in refused(DeviceError, f":{number}: Connection ref", open_port, nobody).hint
 
 

@@ -91,14 +91,8 @@ def test_an_overlong_stretch_counts_once():
     for _ in range(10):
         decoder.feed(b"x" * 100)
     frame = Frame(1, 2, 3, b"abc")
-    assert decoder.feed(b"x\0" + encode(frame)) == [frame]
+    assert decoder.feed(b"x" + bytes(1000) + encode(frame)) == [frame], "idle is no fault"
     assert decoder.bad == 1
-
-
-def test_idle_delimiters_are_no_fault():
-    decoder = Decoder()
-    assert decoder.feed(bytes(1000)) == []
-    assert decoder.bad == 0
 
 
 @pytest.mark.parametrize(
@@ -149,28 +143,14 @@ def test_what_does_not_fit_is_refused(kind, values):
     refused(wire.MessageError, "", wire.pack, getattr(wire, kind)(*values))
 
 
-def test_values_without_a_name_are_refused():
-    refused(wire.MessageError, "RefusalReason", wire.unpack, 0x86, b"\xff\0\0")
-    refused(wire.MessageError, "0x42", wire.unpack, 0x42, b"")
-
-
 @given(st.integers(0, 0xFFFF), st.integers(1, 0xFFFF))
 def test_labels(run, attempt):
-    label = wire.pack_label(run, attempt)
-    assert 0 < label < 2**32
-    assert wire.unpack_label(label) == (run, attempt)
+    assert wire.unpack_label(wire.pack_label(run, attempt)) == (run, attempt)
 
 
 @pytest.mark.parametrize("pair", [(-1, 1), (65536, 1), (1, 0), (1, 65536)])
 def test_impossible_labels(pair):
     refused(ValueError, "65535", wire.pack_label, *pair)
-
-
-def test_a_flicker_of_some_gate_is_told_without_a_number():
-    assert (
-        DeviceRefusedError(wire.RefusalReason.GATE_UNSTEADY, 0).message
-        == "a gate changed after arming"
-    )
 
 
 @pytest.mark.parametrize("reason", wire.RefusalReason)

@@ -5,13 +5,11 @@ from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from rig.bench.references import exact_coefficients, exact_fall
 from rig.model import paper
 from rig.model.chain import Chain
-from rig.model.continuum import UniformChain, end
 from rig.model.fall import fall
 from rig.model.impact import alpha_inclined, gamma_finite
 from rig.model.predict import predict
@@ -19,7 +17,7 @@ from rig.model.surface import Pile, Surface
 from rig.protocol.reader import read
 from rig.units import Quantity
 from tests.model.chains import even_chain
-from tests.tables import cases
+from tests.tables import cases, read_table
 
 CHAIN = even_chain(25)
 SURFACE = Surface(Quantity(0.5), Quantity(0.2))
@@ -157,21 +155,17 @@ def test_figure_4_ends_at_the_surface_with_the_separation():
         assert speed2 == pytest.approx(2 * paper.GRAVITY * (1.345 - height), rel=1e-12, abs=1e-14)
 
 
-def test_what_the_text_says_of_a_chain_stands_beside_the_equations():
-    columns = paper.figure_4()
-    times, ahead = columns["time_s"], np.subtract(columns["free_height_m"], columns["height_m"])
-    assert len(times) == 2 * paper.graded_chain().rods  # the last impact changes no speed
-    two_frames_before = 100.0 * np.interp(times[-1] - 2.0 / 480.0, times[1::2], ahead[1::2])
-    (graded,) = (text for claim, text in paper.claims()[4].items() if "graded" in claim)
-    assert graded.split("; ")[1].startswith(f"{two_frames_before:.1f} cm")
-    # From 1 km/s gravity counts no more.
-    quick, slow = (
-        end(UniformChain(paper.LENGTH, paper.PITCH, 0.1, 0.0, 0.0, paper.GRAVITY, speed))
-        for speed in (1e3, 0.0)
-    )
-    (larger,) = (text for claim, text in paper.claims()[6].items() if "S17" in claim)
-    more = 100.0 * quick.separation_m / slow.separation_m - 100.0
-    assert larger.endswith(f"{more:.0f} % at α = 0.1")
+@cases
+def test_the_figures_of_the_paper_are_these_numbers(figure, columns):
+    found = getattr(paper, figure)()
+    sums = {name: [len(of), of[0], of[-1], math.fsum(of)] for name, of in found.items()}
+    assert sums.keys() == columns.keys()
+    for name, wanted in columns.items():
+        assert sums[name] == pytest.approx(wanted, rel=1e-12, abs=1e-14), name
+
+
+def test_what_the_text_says_otherwise_than_the_equations():
+    assert paper.claims() == read_table(__file__, "claims")
 
 
 PROTOCOLS = Path(__file__).parents[2] / "protocols"
