@@ -60,14 +60,6 @@ def test_each_uncertainty_is_slope_times_input(name, incline):
     assert found.speed_u_m_s == pytest.approx(abs(speed) * u, rel=1e-6, abs=0)
 
 
-def test_uncertainties_add_in_quadrature():
-    u = {"beta": 0.05, "mu": 0.02, "drop": 0.002, "gravity": 0.01}
-    parts = [with_u(**{name: value}) for name, value in u.items()]
-    whole = with_u(**u)
-    assert whole.separation_u_m == pytest.approx(math.hypot(*(p.separation_u_m for p in parts)))
-    assert whole.speed_u_m_s == pytest.approx(math.hypot(*(p.speed_u_m_s for p in parts)))
-
-
 def test_a_small_uncertain_speed_and_little_air_count():
     given = {key: Quantity(number, 0.0) for key, number in CENTRE.items()}
     scene = CHAIN, Surface(given["beta"], given["mu"]), 40.0, given["drop"], given["gravity"]

@@ -1,6 +1,5 @@
 """A session driven by keys, against the daemon with a simulated rig."""
 
-import asyncio
 from dataclasses import replace
 
 from rig.campaign.machine import Stage
@@ -70,6 +69,6 @@ async def test_a_second_screen_watches_and_can_only_stop(lab):
         await other.drive()
         other.app.driver.asked = op.app.driver.asked
         lab.protocol.write_text("protocol: 1\n", "utf-8")  # so it cannot be opened again
-        await asyncio.to_thread(lab.stop)
+        lab.stop()
         await other.see("HOME", "fence.yaml:1:1: chains: missing")
         await op.at(Stage.PROTOCOL)
