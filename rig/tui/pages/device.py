@@ -17,12 +17,8 @@ from rig.tui.widgets.text import check_line, plain
 def face(model: Model, desk: Desk) -> Face:
     """Return the device page: connection, and state of the gates."""
     rig = hanging(model, desk)[1]
-    words = [
-        *board(model.protocol, model.indicators, desk.width),
-        Content(""),
-        _gate_check(model),
-        _release(model),
-    ]
+    gates = board(model.protocol, model.indicators, desk.width)
+    words = [*gates, Content(""), _gate_check(model), _release(model)]
     return Face(_facts(model), rig, words=Content("\n").join(words), top=True)
 
 
