@@ -45,7 +45,8 @@ _FAR = 2.5
 """Radius of the grid of starts in prior standard uncertainties: 99 % of drops as stated."""
 _NODES = 400
 PEAKS = 5
-"""Starts of a batch that are annealed; half of the grid points of the first batch."""
+"""Candidates of a search that are pursued: starts of a batch, readings, faults. Twice as many grid
+points are in the first batch."""
 LEAST = 0.6
 """Least share of the expected edges that a fall must explain. Also the least share of the best
 start's votes with which another start is tried, and the largest share of edges that it may assign
@@ -263,12 +264,9 @@ class SideFall:
     @cached_property
     def columns(self) -> Index:
         """Places of its unknowns in the drop's vector, as `RELEASE` and the others say."""
-        names = NAMES[:ALPHA] if self.record.ratios is None else NAMES
-        blocks = {
-            **self.model.unknowns.blocks,
-            "release": self.model.unknowns[f"{self.role} release"],
-        }
-        return np.array([blocks[name].start for name in names])
+        names = [f"{self.role} release", *NAMES[START:]]
+        names = names[:ALPHA] if self.record.ratios is None else names
+        return np.array([self.model.unknowns[name].start for name in names])
 
     @cached_property
     def sd(self) -> Array:

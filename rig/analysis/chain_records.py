@@ -166,6 +166,8 @@ class ChainRecord:
         Number of edges left out, from the middle of flickers longer than `LONGEST`.
     blank
         The record without edges, which all drops of a condition have in common.
+    scene
+        What all but the edges follows from, with the protocol; equal for those drops.
     """
 
     role: Side
@@ -183,6 +185,7 @@ class ChainRecord:
     aside: tuple[int, ...] = ()
     thinned: int = 0
     blank: ChainRecord | None = field(default=None, repr=False)
+    scene: tuple[object, ...] = ()
 
     @property
     def strikes(self) -> Array:
@@ -323,6 +326,7 @@ def _blank_records(
                 air=np.append(air, air[-1]) if impacts and np.ptp(air) else air[:1],
                 unlike=unlike(chain.chain, shares[name]),
                 aside=tuple(n for n, _ in gates if n in aside),
+                scene=(role, run, aside, darkening),
                 **impacts,
             )
         )

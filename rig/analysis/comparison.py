@@ -137,6 +137,7 @@ def _compare(name: str, lines: Sequence[_Line]) -> Comparison:
     moves = np.array([[line.slopes.get(key, {}).get(name, 0.0) for key in names] for line in lines])
     size = np.sum(moves**2, axis=1) + [line.values[0].u ** 2 for line in lines]
     covariance = _covariance(lines) + moves @ moves.T
+    # What is above zero by rounding alone is exact.
     inexact = covariance.diagonal() > math.sqrt(np.finfo(float).eps) * size
     covariance, lines = covariance[np.ix_(inexact, inexact)], [*compress(lines, inexact)]
     differences = tuple(

@@ -316,4 +316,7 @@ def _strike_u(model: DropModel, role: str) -> Array:
 
 @lru_cache(maxsize=64)
 def _model_of(protocol: Protocol, *blank: ChainRecord) -> DropModel:
-    return DropModel(protocol, blank, 0.0)
+    model = DropModel(protocol, blank, 0.0)
+    # By content: whichever models are forgotten, drops of a condition stay together.
+    model.condition = protocol, *(record.scene for record in blank)
+    return model

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     Matches = Mapping[str, Index] | Mapping[str, "Seen"]
 
 HUBER = 4.0
-"""Standard deviations beyond which an edge is given less weight."""
+"""Standard deviations beyond which a value is unusual: an edge is given less weight, and drag below
+zero is no chance."""
 STRAY = 6.0
 """Standard deviations beyond which an edge belongs to no rod after the fit."""
 SHARED = 0.5

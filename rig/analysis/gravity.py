@@ -14,6 +14,7 @@ import numpy as np
 
 from rig.analysis.annealing import count_matched
 from rig.analysis.averages import mean
+from rig.analysis.chain_records import SIDES
 from rig.analysis.evidence import STATED_WEIGHT
 from rig.analysis.fit import Fit
 from rig.analysis.result import DropResult, Measured, good_runs
@@ -99,7 +100,7 @@ def free_gravity(fit: Fit) -> Measured | None:
     if rows is None or model.protocol.surface is None:
         return None
     edges, free = count_matched(fit.matches["free"]), rows.columns
-    if edges < STATED_WEIGHT:
+    if edges < SIDES:
         return None
     at = int(np.flatnonzero(free == model.unknowns["gravity"].start)[0])
     x, sd, pull = estimate.x[free], estimate.sd[free], model.unknowns.pull(estimate.x)[free]

@@ -14,7 +14,17 @@ from typing import TypeVar
 
 import numpy as np
 
-from rig.analysis.annealing import LEAST, MISSED, PEAKS, FallFit, SideFall, count_matched
+from rig.analysis.annealing import (
+    ALPHA,
+    LEAST,
+    MISSED,
+    NAMES,
+    PEAKS,
+    START,
+    FallFit,
+    SideFall,
+    count_matched,
+)
 from rig.analysis.chain_records import SIDES, ChainRecord
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY
@@ -230,7 +240,7 @@ def _begin(model: DropModel, pair: Sequence[FallFit]) -> DropFit:
 def _merge(model: DropModel, pair: Sequence[FallFit]) -> Array:
     """Return the unknowns of a drop: of what both sides have the mean, the rest of either."""
     x: Array = np.sum([side.x for side in pair], axis=0)
-    for name in ("drop", "clock", "gravity", "drag"):
+    for name in NAMES[START:ALPHA]:
         x[model.unknowns[name]] /= len(pair)
     return x
 

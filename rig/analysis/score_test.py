@@ -69,6 +69,7 @@ def scores(
     follow = -estimate.inverse @ (estimate.inverse.T @ (jacobian.T @ moved))
     # Information left by the other unknowns and priors, without a difference of large numbers.
     own = np.sum((moved + jacobian @ follow) ** 2, axis=0) + np.sum(follow**2, axis=0)
+    # A direction with less than half of a double's digits left is replaced by other unknowns.
     h = np.where(own > math.sqrt(np.finfo(float).eps) * np.sum(moved**2, axis=0), own, np.inf)
     slope, u = left @ moved, np.where(np.isfinite(h), h**-0.5, np.inf)
     return Scores(-slope / h, u, 0.5 * slope**2 / h, estimate.sd[:, None] * follow)

@@ -6,6 +6,7 @@ from dataclasses import asdict, replace
 import numpy as np
 import pytest
 
+from rig.analysis import chain_records
 from rig.analysis.budgets import Budgets
 from rig.analysis.components import above
 from rig.analysis.equations import STRAY, linearize
@@ -29,7 +30,6 @@ class Whole:
     """All equations of all drops in one matrix, nothing eliminated, in prior units."""
 
     def __init__(self, joint) -> None:
-        self.joint = joint
         size = len(joint.shared)
         self.columns = []
         for drop in joint.drops:
@@ -72,9 +72,8 @@ def test_eliminating_drop_by_drop_is_solving_all_at_once(name, near, line):
     np.testing.assert_allclose(
         whole.inverse[:size, :size], joint.covariance, rtol=near, atol=1e-2 * near
     )
-    budgets = Budgets(joint)
     for drop, place in zip(joint.drops, whole.columns, strict=True):
-        found = budgets.measure_all(drop)
+        found = Budgets(joint).measure_all(drop)
         for quantity, result in measurands(drop.model, drop.x).items():
             measured, full = found[quantity], np.zeros(whole.x.size)
             full[place] = result.slopes * drop.model.unknowns.sd
@@ -94,11 +93,13 @@ def test_eliminating_drop_by_drop_is_solving_all_at_once(name, near, line):
 
 
 def test_how_many_drops_are_fitted_at_once_changes_no_result(monkeypatch):
-    """Drops of one condition: all in an array, or each in its own."""
+    """Drops of one condition: all in an array, or each in its own; also once it was forgotten."""
     together = fit_session(FOUR)
     monkeypatch.setattr("rig.analysis.joint_step._AT_ONCE", 1)
+    chain_records._blank_records.cache_clear()
     each = joint_fit(fits(cases(FOUR)))
     for pair in zip(each.drops, together.drops, strict=True):
+        assert len({drop.model.condition for drop in pair}) == 1
         one, other = (
             Budgets(fit).measure_all(drop) for fit, drop in zip((each, together), pair, strict=True)
         )

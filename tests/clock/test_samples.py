@@ -87,24 +87,16 @@ def axis_one_by_one(pings, breaks):
 
 @examples(150)
 @given(conversations())
-def test_epochs_are_those_of_one_sample_after_the_other(drawn):
-    pings, cuts, _ = drawn
-    found = [
-        [ClockSample(*row) for row in piece.tolist()]
-        for piece in epochs(samples(pings), HZ, cuts).pings
-    ]
-    assert found == epochs_one_by_one(pings, cuts)
-
-
-@examples(150)
-@given(conversations())
-def test_the_axis_is_that_of_one_sample_after_the_other(drawn):
+def test_epochs_and_axis_are_those_of_one_sample_after_the_other(drawn):
     pings, boots, breaks = drawn
     given_samples = samples(pings)
+    pieces = epochs(given_samples, HZ, boots).pings
+    found = [[ClockSample(*row) for row in piece.tolist()] for piece in pieces]
+    assert found == epochs_one_by_one(pings, boots)
     axis = one_axis(given_samples, boots, breaks)
-    found, lives = axis_one_by_one(pings, breaks)
-    assert [ClockSample(*row) for row in axis.pings.tolist()] == found
-    assert [[tuple(stretch) for stretch in life] for life in axis.lives] == lives
+    found = [ClockSample(*row) for row in axis.pings.tolist()]
+    lives = [[tuple(stretch) for stretch in life] for life in axis.lives]
+    assert (found, lives) == axis_one_by_one(pings, breaks)
     assert (given_samples == samples(pings)).all(), "what was given stays as it is"
 
 
