@@ -51,7 +51,8 @@ class CacheFolder:
             file = self._file(key)
             file.parent.mkdir(exist_ok=True)
             with os.scandir(file.parent) as beside:
-                used = sum(entry.stat().st_size for entry in beside)
+                # What another process has only begun may be renamed meanwhile.
+                used = sum(entry.stat().st_size for entry in beside if "." not in entry.name)
             if used + len(packed) > self._most_bytes:
                 shutil.rmtree(file.parent)
                 file.parent.mkdir()
