@@ -74,7 +74,7 @@ class Estimate:
 
 
 def adjust(
-    model: DropModel, matches: Matches, x: Array, centre: Array | None = None, done: float = DONE
+    model: DropModel, matches: Matches, x: Array, centre: Array | None = None, steps: int = STEPS
 ) -> Estimate:
     """Fit all unknowns of a drop to its matched edges.
 
@@ -89,8 +89,8 @@ def adjust(
         First guess.
     centre
         Prior means of the unknowns, zero if not given.
-    done
-        Length of the last step, see `length`.
+    steps
+        Greatest number of steps.
     """
 
     def about(at: Array, inflation: float) -> Linearization:
@@ -98,7 +98,7 @@ def adjust(
 
     at = model.unknowns
     centre = np.where(at.flat, math.nan, 0.0 if centre is None else centre)
-    return least_squares(about, at.sd, x, centre, done)
+    return least_squares(about, at.sd, x, centre, steps=steps)
 
 
 @np.errstate(all="ignore")  # a step to a NaN loss is rejected

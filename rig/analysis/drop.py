@@ -14,7 +14,7 @@ from rig.analysis.drop_model import DropModel
 from rig.analysis.edge_classes import count_unexplained, unmatched_edges
 from rig.analysis.explanations import Explainer
 from rig.analysis.faults import Premise, Suspects
-from rig.analysis.fit import Begun, DropFit, Fit, match, settle
+from rig.analysis.fit import Begun, DropFit, Fit, settle
 from rig.analysis.gravity import free_gravity
 from rig.analysis.identify import DropIdentity, few_edges, identify, pattern_faults
 from rig.analysis.joint_fit import by_itself
@@ -156,18 +156,13 @@ class DropCase:
             case = replace(stated, aside=low)
             reading = reading if latest else case._identify(readings)
             fits[low] = reading, latest = case._settle(reading, latest)
-            # Not identified with all gates, a drop says nothing about those that are left out.
-            low = (stated if fits[stated.aside][1] else case)._too_low(latest)
+            matches = latest.matches if latest else None
+            low = *low, *gates_too_low(self.protocol, case.records, matches)
         if case.aside:
             without = result, _ = case._judge(*fits[case.aside], readings, explain=False)
             if not is_wrong(result.reasons):
                 return without
         return stated._judge(*fits[stated.aside], readings, explain=explain)
-
-    def _too_low(self, fit: Fit | None) -> tuple[int, ...]:
-        """Return the gates that are left out or too low for a drop, fitted with any of them."""
-        matches = None if fit is None else match(self._model(fit.model.alpha), fit.x)
-        return *self.aside, *gates_too_low(self.protocol, self.records, matches)
 
     def _at_contact(self) -> DropCase:
         return replace(self, protocol=of_run(self.protocol, self.run))
