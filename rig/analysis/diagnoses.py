@@ -160,7 +160,7 @@ def _values(protocol: Protocol, gate: int) -> dict[str, Any]:
 
 
 def gates_too_low(
-    protocol: Protocol, records: Iterable[ChainRecord], matches: Matches | None
+    protocol: Protocol, records: Iterable[ChainRecord], fit: Fit | None
 ) -> tuple[int, ...]:
     """Return the lowest gates beside the striking chain that miss more rods than by chance.
 
@@ -171,7 +171,7 @@ def gates_too_low(
     ----------
     records
         The chains with their edges.
-    matches
+    fit
         `None` if the drop is not identified: then the number of edges is used.
 
     Returns
@@ -179,7 +179,7 @@ def gates_too_low(
     tuple of int
         Numbers of the gates in the protocol's list.
     """
-    counts = gate_counts(records, matches)
+    counts = gate_counts(records, fit.matches if fit else None)
     due, hidden = sum(gate.due for gate in counts), sum(gate.hidden for gate in counts)
     struck, gates = [gate for gate in counts if gate.role == "impact"], protocol.gates.gates
     low: list[int] = []

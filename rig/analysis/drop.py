@@ -156,8 +156,7 @@ class DropCase:
             case = replace(stated, aside=low)
             reading = reading if latest else case._identify(readings)
             fits[low] = reading, latest = case._settle(reading, latest)
-            matches = latest.matches if latest else None
-            low = *low, *gates_too_low(self.protocol, case.records, matches)
+            low = *low, *gates_too_low(self.protocol, case.records, latest)
         if case.aside:
             without = result, _ = case._judge(*fits[case.aside], readings, explain=False)
             if not is_wrong(result.reasons):

@@ -19,7 +19,7 @@ import numpy as np
 
 from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import ALPHA_SD, Components, above
-from rig.analysis.departures import MODES, drawn, lags, lever, slack, strike_u, swing_sd
+from rig.analysis.departures import MODES, SLACK_WAY, drawn, lags, lever, slack, strike_u, swing_sd
 from rig.analysis.equations import SHARED, ExpectedEdges, standardise
 from rig.analysis.trajectory import COMMON, NAMES, ONE
 from rig.arrays import Array, Flags, Index
@@ -239,9 +239,15 @@ def _lag(side: Side) -> Array:
     return -lags(side.record, side.protocol.drop.value, side.edges.rods, side.edges.levels)
 
 
-def _slack_sd(side: Side) -> list[float] | None:
-    """Prior of each rod's slack: held by one other rod, like the top rod of the last two."""
-    return [_top_sd(side)] * side.rods if side.record.unlike.any() else None
+def _slack_sd(side: Side) -> Array | None:
+    """Prior of each rod's slack: held by one other rod, like the top rod of the last two.
+
+    A rod that air slows more than those above may lag behind them, as far as air slows it alone:
+    strings pull, but do not push.
+    """
+    loose, air = np.minimum.accumulate(side.record.unlike), math.hypot(*prior_air(side.protocol))
+    lag = (loose - loose.mean()) * air * SLACK_WAY**2 / 3.0
+    return np.hypot(_top_sd(side), lag) if side.record.unlike.any() else None
 
 
 def _slack(side: Side) -> Array:
