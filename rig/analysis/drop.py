@@ -212,12 +212,11 @@ class DropCase:
         verdict = verdict_of(reasons)
         if verdict == "void" or fit is None:
             if reading.unlike and explain:
-                if reading.explained is None:
-                    explainer = self._explainer(reading.scale, suspects(records))
-                    reading = replace(reading, explained=explainer.name_fault(None))
-                    known = readings[self.aside]
-                    readings[self.aside] = replace(known, explained=reading.explained)
-                reasons = (*reasons, *(reading.explained or ()))
+                named = reading.explained
+                if named is None:
+                    named = self._explainer(reading.scale, suspects(records)).name_fault(None)
+                    readings[self.aside] = replace(readings[self.aside], explained=named)
+                reasons = (*reasons, *named)
             return DropResult(run, drop.attempt, verdict, reasons, audit), None
         unmatched = unmatched_edges(fit)
         audit = audit.count(fit.match_count, count_unexplained(unmatched))

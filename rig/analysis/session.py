@@ -185,7 +185,7 @@ def analyze(
             if summary is not before:
                 known[case.drop] = summary
             yield case, summary
-            if progress is not None:
+            if progress:
                 progress(done, total)
 
     with closing(summarize_drops()) as summarized:  # ends other processes
@@ -194,7 +194,7 @@ def analyze(
 
 def _summarize(task: tuple[DropCase, DropSummary | None]) -> DropSummary:
     case, before = task
-    if before is not None and before.scale == case.scale:
+    if before and before.scale == case.scale:
         return before
     return case.summary(before, explain=False)
 

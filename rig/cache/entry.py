@@ -38,8 +38,8 @@ def find(kind: type[Kept], *content: object, fresh: bool = False) -> Kept | None
     return None
 
 
-def keep(result: Kept, *content: object) -> Kept:
-    """Keep a result, and return it as `find` will.
+def keep(result: object, *content: object) -> str:
+    """Keep a result, and return its text: read again, it is as `find` will return it.
 
     Parameters
     ----------
@@ -52,8 +52,7 @@ def keep(result: Kept, *content: object) -> Kept:
     key, text = _key(type(result), content), to_text(result)
     if key and not getattr(result, "failed", ()):
         CacheFolder().put(key, text)
-    found: Kept = from_text(text)
-    return found
+    return text
 
 
 def recall(
@@ -61,7 +60,7 @@ def recall(
 ) -> Kept:
     """Return a kept result, or else make it; arguments as for `find`."""
     result = find(kind, *content, fresh=fresh)
-    return keep(make(), *content) if result is None else result
+    return from_text(keep(make(), *content)) if result is None else result
 
 
 def _key(kind: type, content: tuple[object, ...]) -> str:

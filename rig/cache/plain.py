@@ -56,8 +56,8 @@ def _plain(value: Any) -> object:
     if isinstance(value, Mapping):
         return [_MAPPING, [*map(_plain, value)], [*map(_plain, value.values())]]
     kind: Any = type(value)
-    if kind in _SEQUENCES.values():
-        return [kind.__name__, *map(_plain, value)]
+    if kind in _SEQUENCES.values():  # rods of hundreds of edges: most need no call
+        return [kind.__name__, *(x if type(x) in _SCALARS else _plain(x) for x in value)]
     parts = (_plain(getattr(value, name)) for name in _fields(kind))
     return [f"{kind.__module__}:{kind.__qualname__}", *parts]
 

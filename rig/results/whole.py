@@ -11,6 +11,7 @@ from rig.analysis.gravity import GravityCheck, check_gravity
 from rig.analysis.session import Analysis, Progress, analyze
 from rig.analysis.summary import Incline
 from rig.cache.entry import find, keep
+from rig.cache.plain import from_text
 from rig.clock.calibration import Calibration, Calibrator, TimeScale
 from rig.plain_data import attributes, plain
 from rig.protocol import reader
@@ -151,7 +152,8 @@ def results(
         if stored is not None:  # the course of a clock's rate is not stored
             return replace(stored, clock=calibration(session))
         new = _analyze(session, progress, fresh=fresh)
-        return replace(keep(new, new.digest), clock=new.clock, complete=new.complete)
+        kept: SessionResults = from_text(keep(new, new.digest))
+        return replace(kept, clock=new.clock, complete=new.complete)
 
 
 def _analyze(session: Reader, progress: Progress | None, *, fresh: bool) -> SessionResults:
