@@ -212,11 +212,10 @@ class DropCase:
         verdict = verdict_of(reasons)
         if verdict == "void" or fit is None:
             if reading.unlike and explain:
-                named = reading.explained
-                if named is None:
+                if reading.explained is None:
                     named = self._explainer(reading.scale, suspects(records)).name_fault(None)
-                    readings[self.aside] = replace(readings[self.aside], explained=named)
-                reasons = (*reasons, *named)
+                    readings[self.aside] = reading = replace(reading, explained=named)
+                reasons = (*reasons, *(reading.explained or ()))
             return DropResult(run, drop.attempt, verdict, reasons, audit), None
         unmatched = unmatched_edges(fit)
         audit = audit.count(fit.match_count, count_unexplained(unmatched))
