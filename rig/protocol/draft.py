@@ -11,6 +11,7 @@ from rig.errors import InputError
 from rig.protocol.keys import KEYS
 from rig.protocol.protocol import Protocol, Side
 from rig.protocol.reader import parse
+from rig.reasons import rig_error
 from rig.text_rows import read_rows, read_text
 
 Scene = Literal["two-chains", "one-chain", "object", "track", "picket-fence"]
@@ -97,8 +98,7 @@ def _share_gates(draft: Draft) -> dict[Side, int]:
     if draft.scene != "two-chains":
         return {"impact" if draft.scene == "one-chain" else "free": draft.gates}
     if draft.gates < 2:
-        hint = "for one gate use --scene one-chain"
-        raise InputError("two chains need two gates, one on each side", hint)
+        raise rig_error("gates_too_few")
     impact = 1 if draft.gates < 5 else draft.gates // 2
     return {"impact": impact, "free": draft.gates - impact}
 
@@ -121,8 +121,7 @@ def _low_and_high(protocol: Protocol, side: Side, number: int) -> list[float]:
         gaps.remove(gap)
         heights.append(gap)
     if len(heights) < number:
-        hint = f"use {len(heights)} a side, a longer drop or thinner rods"
-        raise InputError(f"there is no space for {number} gates on one side", hint)
+        raise rig_error("gates_too_many", gates=number, fitting=len(heights))
     return heights
 
 
