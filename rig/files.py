@@ -141,14 +141,17 @@ def state_folder() -> Path:
         return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "chainrig"
 
 
+def stat_of(path: Path) -> os.stat_result | None:
+    """Return what the system says of a file; `None` without one."""
+    with suppress(OSError):
+        return path.stat()
+    return None
+
+
 def file_stamp(path: Path) -> tuple[tuple[int, int, int], ...]:
     """Tell a session file, and what was written beside it, from what they were before."""
-    stats = []
-    for file in (path, beside(path, "-wal")):
-        with suppress(OSError):
-            stat = file.stat()
-            stats.append((stat.st_ino, stat.st_mtime_ns, stat.st_size))
-    return tuple(stats)
+    stats = map(stat_of, (path, beside(path, "-wal")))
+    return tuple((stat.st_ino, stat.st_mtime_ns, stat.st_size) for stat in stats if stat)
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:
