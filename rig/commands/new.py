@@ -25,6 +25,8 @@ from rig.text_rows import read_rows, read_text
 
 _CHOICE = read_text(__file__, "choose.txt")
 """What somebody has, the ready protocol for it, and the command; README begins with it too."""
+_MOST = {"gates": GATES, "rods": 1000, "repeats": 1000}
+"""The largest number that an option accepts."""
 
 
 def main(arguments: Arguments) -> int:
@@ -68,7 +70,7 @@ def _read_answers(arguments: Arguments, path: Path) -> tuple[str, Draft]:
         if here and option not in answers:
             answers[option] = _ask(arguments, option, question, usual, " ".join(words).split())
     answers = {"rods": "1", "length": "", "incline": ""} | answers
-    for option, limit in {"gates": GATES, "rods": 1000, "repeats": 1000}.items():
+    for option, limit in _MOST.items():
         answers[option] = _count(option, answers[option], limit)
     title = arguments.title or path.stem.replace("-", " ").replace("_", " ")
     sizes = {name: answers[name] for name in Draft._fields if name in answers}
@@ -90,12 +92,13 @@ def _ask(arguments: Arguments, option: str, words: str, usual: str, accepted: Se
     if not _can_ask(arguments):
         say(f"{words} {usual} (--{option})")
         return usual
-    choice = f" ({', '.join(accepted)})" if accepted else ""
+    choice, most = f" ({', '.join(accepted)})" if accepted else "", _MOST.get(option, 0)
     while True:
         answer = ask(f"{words}{choice} [{usual}] ") or usual
-        if not accepted or answer in accepted:
+        is_number = answer.isdecimal() and 1 <= int(answer) <= most
+        if is_number or answer in accepted or not (most or accepted):
             return answer
-        say(f"  accepted: {', '.join(accepted)}")
+        say(f"  accepted: {', '.join(accepted) or f'a whole number from 1 to {most}'}")
 
 
 def _count(name: str, text: str, limit: int) -> int:
