@@ -15,8 +15,7 @@ from rig.protocol import measurable
 from rig.protocol.contact import touching_heights
 from rig.protocol.fields import DEFAULTS
 from rig.protocol.keys import SECTIONS, range_of
-from rig.protocol.plan import PATTERNS, runs
-from rig.protocol.protocol import STANDARD_GRAVITY, Protocol
+from rig.protocol.protocol import PATTERNS, STANDARD_GRAVITY, Protocol
 from rig.text_rows import read_text
 from rig.units import Quantity, format_quantity
 
@@ -57,7 +56,6 @@ def describe(protocol: Protocol, notes: Sequence[str] = ()) -> str:
     boards = BOARDS.items() if protocol.gates else ()
     text = _DESCRIPTION.render(
         protocol=protocol,
-        runs=runs(protocol),
         lacking={word: measurable.lacking(protocol, board) for word, board in boards},
         assumed=_assumed(protocol),
         notes=notes,

@@ -14,7 +14,6 @@ from rig.analysis import curves
 from rig.analysis.result import GOOD
 from rig.estimate.session import SessionEstimate
 from rig.measurands import SEPARATION
-from rig.protocol import plan
 from rig.protocol.protocol import Protocol
 from rig.report import attachments, estimate, figures, finding, parts, timeline
 from rig.report.falls import TimedDrop, fall_figures
@@ -89,4 +88,4 @@ def _best_fall(protocol: Protocol, timed: Iterable[TimedDrop]) -> Iterator[Chart
     return fall_figures(protocol, good[0]) if good else iter(())
 
 
-_MODULES = attachments, curves, estimate, figures, finding, improvements, parts, plan, timeline
+_MODULES = attachments, curves, estimate, figures, finding, improvements, parts, timeline

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 from rig.analysis.result import Measured
 from rig.protocol import reader
-from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Gate, Run
 from rig.reasons import OPERATOR, SENTENCE, WORDINGS, Severity, make_reason, plain_reason, remedies
 from rig.records import Drop, Edge
@@ -73,7 +72,7 @@ def test_a_finding_of_nothing_says_so():
 
 def test_departures_from_the_plan_are_named():
     protocol = reader.read(PROTOCOLS / "single-chain.yaml")
-    planned = planned_runs(protocol)
+    planned = protocol.runs()
     made = [made_up(run) for run in planned]
     whole = fake_analysis.analysis(made, [])
     assert deviations(protocol, whole, [entry(run.number) for run in planned]) == [NONE]
