@@ -154,11 +154,8 @@ class Bench:
             self.board.reset(now_ns)
             self._deaf_until_ns = now_ns + round(DEAF_S * 1e9)
         sent, heard = self._line.transfer(self.board.line.read(now_ns), self.terminal.read())
-        match self._mute:
-            case "1":
-                sent = b""
-            case "fall" if self.board.phase() == Phase.RECORDING:
-                sent = b""
+        if self._mute == "1" or (self._mute == "fall" and self.board.phase() == Phase.RECORDING):
+            sent = b""
         if now_ns >= self._deaf_until_ns:
             self.board.receive(now_ns, heard)
         self.terminal.write(sent)
@@ -217,9 +214,9 @@ def main(
         "dial", nargs="*", type=_dial, metavar="NAME=VALUE", help="as in a sim:// URL"
     )
     options = parser.parse_args(arguments)
-    dials = dict(options.dial)
+    settings = {"protocol": options.protocol, "seed": options.seed, **dict(options.dial)}
     try:
-        scene = set_scene(scheme, {"protocol": options.protocol, "seed": options.seed} | dials)
+        scene = set_scene(scheme, settings)
         # A board that answers in real time makes no drop while it is asked for.
         scene.lab.make_ahead([pack_label(number, 1) for number in sorted(scene.lab.runs)])
         ppm = scene.dials.clock * 1e6
