@@ -41,7 +41,7 @@ class Operator(NamedTuple):
     """
 
     say: Callable[[str], None]
-    ask: Callable[[str], None] | None = None
+    ask: Callable[[str], object] | None = None
 
 
 def run_protocol(

@@ -71,7 +71,9 @@ def _read_answers(arguments: Arguments, path: Path) -> tuple[str, Draft]:
             answers[option] = _ask(arguments, option, question, usual, " ".join(words).split())
     answers = {"rods": "1", "length": "", "incline": ""} | answers
     for option, limit in _MOST.items():
-        answers[option] = _count(option, answers[option], limit)
+        if not _is_count(text := answers[option], limit):
+            raise rig_error("no_such_number", option=option, text=text, limit=limit)
+        answers[option] = int(text)
     title = arguments.title or path.stem.replace("-", " ").replace("_", " ")
     sizes = {name: answers[name] for name in Draft._fields if name in answers}
     return answers["board"], Draft(title=title, scene=scene, inclines=answers["incline"], **sizes)
@@ -95,16 +97,13 @@ def _ask(arguments: Arguments, option: str, words: str, usual: str, accepted: Se
     choice, most = f" ({', '.join(accepted)})" if accepted else "", _MOST.get(option, 0)
     while True:
         answer = ask(f"{words}{choice} [{usual}] ") or usual
-        is_number = answer.isdecimal() and 1 <= int(answer) <= most
-        if is_number or answer in accepted or not (most or accepted):
+        if answer in accepted or _is_count(answer, most) or not (most or accepted):
             return answer
         say(f"  accepted: {', '.join(accepted) or f'a whole number from 1 to {most}'}")
 
 
-def _count(name: str, text: str, limit: int) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= limit:
-        raise rig_error("no_such_number", option=name, text=text, limit=limit)
-    return int(text)
+def _is_count(text: str, limit: int) -> bool:
+    return text.isdecimal() and 1 <= int(text) <= limit
 
 
 def _simulate(draft: Draft) -> int:
