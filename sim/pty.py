@@ -17,6 +17,7 @@ import json
 import os
 import sys
 import time
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -107,8 +108,7 @@ class Bench:
         words = b""
         while True:
             if self.terminal.wait(_TICK_S, sys.stdin.fileno()):
-                typed = os.read(sys.stdin.fileno(), _CHUNK)
-                if not typed:
+                if not (typed := os.read(sys.stdin.fileno(), _CHUNK)):
                     return
                 *lines, words = (words + typed).split(b"\n")
                 for line in lines:
@@ -164,10 +164,8 @@ class Bench:
         # The board's time stood between the two: a busy machine may let long pass in between.
         before_s, now_s, self._looked_s = self._looked_s, time.monotonic(), begun_s
         self._gap_s = max(self._gap_s, now_s - before_s)
-        if self._log is None:
-            return
         seen = (int(self.board.phase()), self.board.outputs())
-        if seen == self._seen:
+        if self._log is None or seen == self._seen:
             return
         # A recording may begin and be aborted between two looks; a reset shows the drop again.
         if seen[0] == Phase.HOLDING != self._seen[0]:
@@ -206,10 +204,10 @@ def main(
     parser.add_argument(
         "--resets", action="store_true", help="restart the board whenever its terminal is opened"
     )
-    busy = (
-        "of bytes, changed while both directions are busy: some USB chips do so from 230,400 baud"
-    )
-    parser.add_argument("--busy", type=float, default=0.0, metavar="SHARE", help=busy)
+    parser.add_argument(
+        "--busy", type=float, default=0.0, metavar="SHARE", help="of bytes, changed while both "
+        "directions are busy: some USB chips do so from 230,400 baud",
+    )  # fmt: skip
     parser.add_argument(
         "dial", nargs="*", type=_dial, metavar="NAME=VALUE", help="as in a sim:// URL"
     )
@@ -226,13 +224,9 @@ def main(
         return error.exit_code
     line = BadLine(scene.dials.corrupt, scene.dials.lose, options.busy, seed=scene.seed)
     bench = Bench(board, options.link, options.log, line, resets=options.resets)
-    try:
+    with closing(bench), suppress(KeyboardInterrupt):
         print(bench.terminal.path, flush=True)
         bench.serve()
-    except KeyboardInterrupt:
-        pass
-    finally:
-        bench.close()
     return 0
 
 
