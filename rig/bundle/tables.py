@@ -27,16 +27,18 @@ _ROWS = dict(read_rows(__file__, "columns.txt"))
 """The unit by the end of a column's name, which begins with ``_``, and what columns mean."""
 
 
-_MEANINGS = {
-    head + column.name: column.meaning
-    for head, table in [*_ROWS_OF.items(), ("", "run_state")]
-    for column in TABLES[table].columns
-} | _ROWS
-"""What columns mean, those of raw records and of measurands too."""
-for _row in MEASURANDS.values():
-    _MEANINGS[_row.name] = _row.meaning
-    _MEANINGS[_row.key("sd")] = f"{_row.symbol}: standard deviation between runs"
-    _MEANINGS[_row.key("se")] = f"{_row.symbol}: standard error of the mean"
+def _meanings() -> dict[str, str]:
+    """Return what columns mean, those of raw records and of measurands too."""
+    meanings = {
+        head + column.name: column.meaning
+        for head, table in [*_ROWS_OF.items(), ("", "run_state")]
+        for column in TABLES[table].columns
+    } | _ROWS
+    for row in MEASURANDS.values():
+        meanings[row.name] = row.meaning
+        meanings[row.key("sd")] = f"{row.symbol}: standard deviation between runs"
+        meanings[row.key("se")] = f"{row.symbol}: standard error of the mean"
+    return meanings
 
 
 def csv_files(
@@ -156,8 +158,8 @@ def describe_column(table: str, column: str) -> tuple[str, str]:
     """Return unit and meaning of a table's column; empty where its name says all."""
     if column.endswith(("_u", "_U95")):
         return "", ""
-    own = _MEANINGS.get(f"{table}: {column}")
-    return column_unit(column), _MEANINGS.get(column, "") if own is None else own
+    meanings = _meanings()
+    return column_unit(column), meanings.get(f"{table}: {column}", meanings.get(column, ""))
 
 
 def data_package(tables: Mapping[str, str]) -> dict[str, Any]:
