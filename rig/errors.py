@@ -51,6 +51,11 @@ class RigError(Exception):
     def __str__(self) -> str:
         return f"{self.message}\n  hint: {self.hint}" if self.hint else self.message
 
+    @property
+    def two_lines(self) -> str:
+        """Its message and its hint, a line each, as screens take them apart."""
+        return f"{self.message}\n{self.hint}"
+
 
 class InputError(RigError):
     """Bad input: one located line a problem, or one reason for all of it; exit code 2."""

@@ -8,8 +8,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from rig.errors import InputError
-from rig.reasons import errors_become
+from rig.reasons import errors_become, rig_error
 
 _KINDS = {"d": "a folder", "p": "a pipe", "s": "a socket", "c": "a device", "b": "a device"}
 """What is no file, by the letter that ``ls -l`` has for it."""
@@ -91,12 +90,11 @@ def check_place(path: str | os.PathLike[str]) -> None:
     target = Path(os.path.realpath(path))
     with suppress(OSError):  # what may not be looked at is told when it is written
         if target.is_dir():
-            raise InputError(f"cannot write {path}: it is a folder", "name a file in it")
+            raise rig_error("place_is_folder", path=path)
         if not target.parent.is_dir():
-            what = os.strerror(errno.ENOENT)
-            raise InputError(f"cannot write {path}: {what}", "make its folder first")
+            raise rig_error("place_without_folder", path=path)
         if target.is_file() and read_input(target, len(_SQLITE)) == _SQLITE:
-            raise InputError(f"cannot write {path}: a session is there", "name another file")
+            raise rig_error("place_of_session", path=path)
 
 
 def check_new(path: str | os.PathLike[str]) -> Path:
@@ -108,7 +106,7 @@ def check_new(path: str | os.PathLike[str]) -> Path:
         Something is there.
     """
     if os.path.lexists(path):
-        raise InputError(f"{path} already exists", "name a new file, or move this file away")
+        raise rig_error("place_taken", path=path)
     return Path(path)
 
 
@@ -143,14 +141,17 @@ def state_folder() -> Path:
         return Path(os.environ.get("XDG_STATE_HOME") or Path.home() / ".local/state") / "chainrig"
 
 
+def stat_of(path: Path) -> os.stat_result | None:
+    """Return what the system says of a file; `None` without one."""
+    with suppress(OSError):
+        return path.stat()
+    return None
+
+
 def file_stamp(path: Path) -> tuple[tuple[int, int, int], ...]:
     """Tell a session file, and what was written beside it, from what they were before."""
-    stats = []
-    for file in (path, beside(path, "-wal")):
-        with suppress(OSError):
-            stat = file.stat()
-            stats.append((stat.st_ino, stat.st_mtime_ns, stat.st_size))
-    return tuple(stats)
+    stats = map(stat_of, (path, beside(path, "-wal")))
+    return tuple((stat.st_ino, stat.st_mtime_ns, stat.st_size) for stat in stats if stat)
 
 
 def make_folder(path: str | os.PathLike[str]) -> Path:

@@ -142,10 +142,8 @@ def plain_reason(text: str, code: str = SENTENCE) -> Reason:
 
 def make_reason(code: str, words: Vocabulary = ANY_SCENE, /, **values: Any) -> Reason:
     """Make a reason with its sentence in the words of a scene; values as in `Reason`."""
-    sentence = _Phrases(values, words).fill(WORDINGS[code].sentence)
-    if "log_odds" in values:
-        sentence += f" (odds {_odds(values['log_odds'])} to 1)"
-    return Reason(code, values, sentence, words.scene)
+    sentence = WORDINGS[code].sentence + " (odds {odds} to 1)" * ("log_odds" in values)
+    return Reason(code, values, _Phrases(values, words).fill(sentence), words.scene)
 
 
 def rig_error(code: str, /, **values: Any) -> RigError:
@@ -291,6 +289,9 @@ _PHRASES: dict[str, Callable[[_Phrases], str]] = {
     "inputs": lambda p: _inputs(p["channels"]),
     "are": lambda p: "are" if len(p["channels"]) > 1 else "is",
     "on_side": _side,
+    "odds": lambda p: (
+        f"{math.exp(p['log_odds']):.0f}" if p["log_odds"] < math.log(1e4) else "more than 10,000"
+    ),
     "alone": lambda p: _format_measured(p, "alone"),
     "whole": lambda p: _format_measured(p, "whole"),
     "chain": _chain,
@@ -304,7 +305,3 @@ _PHRASES: dict[str, Callable[[_Phrases], str]] = {
         make_reason(fault["code"], p.words, **fault["values"]).text for fault in p["candidates"]
     ),
 }
-
-
-def _odds(log_odds: float) -> str:
-    return f"{math.exp(log_odds):.0f}" if log_odds < math.log(1e4) else "more than 10,000"

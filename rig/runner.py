@@ -16,7 +16,6 @@ from rig.errors import DeviceError
 from rig.link.refusals import DeviceRefusedError
 from rig.protocol import reader
 from rig.protocol.measurable import check_recordable
-from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
 from rig.recorder.interrupts import Interrupts
 from rig.recorder.run_lines import plan_lines
@@ -42,7 +41,7 @@ class Operator(NamedTuple):
     """
 
     say: Callable[[str], None]
-    ask: Callable[[str], None] | None = None
+    ask: Callable[[str], object] | None = None
 
 
 def run_protocol(
@@ -119,7 +118,7 @@ class Campaign:
         self.session = rig.session
         self.operator = operator
         self.interrupts = interrupts
-        self.plan = {run.number: run for run in runs(protocol)}
+        self.plan = {run.number: run for run in protocol.runs()}
         self._log = self.session.states()
         attended, row = operator.ask is not None, voids_of(self._log).row
         self.flow = Flow(Stage.DEVICE, countdown_s=0.0, attended=attended, row=row)

@@ -38,7 +38,7 @@ class Sections:
             if any(isinstance(part, ImportError) for part in (error, error.__cause__)):
                 raise
             # A mistake in the program is to be seen for what it is.
-            why = f"{type(error).__name__}: {error}"
-            if isinstance(error, RigError):
-                why = error.message
+            why = (
+                error.message if isinstance(error, RigError) else f"{type(error).__name__}: {error}"
+            )
             self.failed[name] = f"{name} could not be made: {' '.join(why.split())}"

@@ -13,13 +13,11 @@ class VirtualClock:
     pace
         Real seconds a virtual second shall take: 0 for as fast as possible, 1 for a demonstration
         that looks like the real thing.
-    start_ns
-        Time at the beginning.
     """
 
-    def __init__(self, pace: float = 0.0, start_ns: int = 0) -> None:
+    def __init__(self, pace: float = 0.0) -> None:
         self._pace = pace
-        self._now_ns = start_ns
+        self._now_ns = 0
 
     def now_ns(self) -> int:
         """Virtual time."""

@@ -17,7 +17,6 @@ from rig.model.impact import impact_on
 from rig.model.surface import Surface
 from rig.protocol.contact import contact_level, higher_contacts
 from rig.protocol.measurable import check_released
-from rig.protocol.plan import runs
 from rig.protocol.protocol import GUESSED
 from rig.units import Quantity
 
@@ -143,7 +142,7 @@ class ChainLab:
         self.dials = dials = dials.on(protocol, self._share)
         self.tell = tell
         self.series = 0
-        self.runs = {run.number: run for run in runs(protocol)}
+        self.runs = {run.number: run for run in protocol.runs()}
         self.made: dict[int, Falls] = {}
         self.gates = protocol.gates.gates
         for other in self.others.values():

@@ -60,13 +60,13 @@ class BadLine:
     """
 
     def __init__(self, corrupt: float, lose: float, busy: float, seed: int) -> None:
-        self._ways = tuple(LineFaults(corrupt, lose, 2 * seed + n) for n in (0, 1))
+        self._to_board = LineFaults(corrupt, lose, 2 * seed)
+        self._to_host = LineFaults(corrupt, lose, 2 * seed + 1)
         self._both = LineFaults(corrupt=busy, seed=seed)
 
     def transfer(self, to_host: bytes, to_board: bytes) -> tuple[bytes, bytes]:
         """Pass on what is sent both ways at the same time."""
-        towards_board, towards_host = self._ways
-        to_host, to_board = towards_host.damage(to_host), towards_board.damage(to_board)
+        to_host, to_board = self._to_host.damage(to_host), self._to_board.damage(to_board)
         if to_host and to_board:
             return self._both.damage(to_host), self._both.damage(to_board)
         return to_host, to_board

@@ -13,12 +13,16 @@ from rig.ports import read_settings
 
 from .board import VirtualBoard
 from .clock import VirtualClock
-from .scene import set_scene
+from .scene import read_disturbances, set_scene
 from .serial_port import SimulatedSerial
 
 
 class Serial(SimulatedSerial):
     """The port that pyserial opens for a ``sim://`` URL."""
+
+    def check_settings(self) -> None:
+        """See that the URL's settings, but for files, mean something."""
+        read_disturbances("sim", read_settings(str(self.port)))
 
     def make_board(self) -> VirtualBoard:
         """Hang the chains of the protocol that the URL names."""

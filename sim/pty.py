@@ -17,6 +17,7 @@ import json
 import os
 import sys
 import time
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -107,8 +108,7 @@ class Bench:
         words = b""
         while True:
             if self.terminal.wait(_TICK_S, sys.stdin.fileno()):
-                typed = os.read(sys.stdin.fileno(), _CHUNK)
-                if not typed:
+                if not (typed := os.read(sys.stdin.fileno(), _CHUNK)):
                     return
                 *lines, words = (words + typed).split(b"\n")
                 for line in lines:
@@ -154,11 +154,8 @@ class Bench:
             self.board.reset(now_ns)
             self._deaf_until_ns = now_ns + round(DEAF_S * 1e9)
         sent, heard = self._line.transfer(self.board.line.read(now_ns), self.terminal.read())
-        match self._mute:
-            case "1":
-                sent = b""
-            case "fall" if self.board.phase() == Phase.RECORDING:
-                sent = b""
+        if self._mute == "1" or (self._mute == "fall" and self.board.phase() == Phase.RECORDING):
+            sent = b""
         if now_ns >= self._deaf_until_ns:
             self.board.receive(now_ns, heard)
         self.terminal.write(sent)
@@ -167,10 +164,8 @@ class Bench:
         # The board's time stood between the two: a busy machine may let long pass in between.
         before_s, now_s, self._looked_s = self._looked_s, time.monotonic(), begun_s
         self._gap_s = max(self._gap_s, now_s - before_s)
-        if self._log is None:
-            return
         seen = (int(self.board.phase()), self.board.outputs())
-        if seen == self._seen:
+        if self._log is None or seen == self._seen:
             return
         # A recording may begin and be aborted between two looks; a reset shows the drop again.
         if seen[0] == Phase.HOLDING != self._seen[0]:
@@ -209,17 +204,17 @@ def main(
     parser.add_argument(
         "--resets", action="store_true", help="restart the board whenever its terminal is opened"
     )
-    busy = (
-        "of bytes, changed while both directions are busy: some USB chips do so from 230,400 baud"
-    )
-    parser.add_argument("--busy", type=float, default=0.0, metavar="SHARE", help=busy)
+    parser.add_argument(
+        "--busy", type=float, default=0.0, metavar="SHARE", help="of bytes, changed while both "
+        "directions are busy: some USB chips do so from 230,400 baud",
+    )  # fmt: skip
     parser.add_argument(
         "dial", nargs="*", type=_dial, metavar="NAME=VALUE", help="as in a sim:// URL"
     )
     options = parser.parse_args(arguments)
-    dials = dict(options.dial)
+    settings = {"protocol": options.protocol, "seed": options.seed, **dict(options.dial)}
     try:
-        scene = set_scene(scheme, {"protocol": options.protocol, "seed": options.seed} | dials)
+        scene = set_scene(scheme, settings)
         # A board that answers in real time makes no drop while it is asked for.
         scene.lab.make_ahead([pack_label(number, 1) for number in sorted(scene.lab.runs)])
         ppm = scene.dials.clock * 1e6
@@ -229,13 +224,9 @@ def main(
         return error.exit_code
     line = BadLine(scene.dials.corrupt, scene.dials.lose, options.busy, seed=scene.seed)
     bench = Bench(board, options.link, options.log, line, resets=options.resets)
-    try:
+    with closing(bench), suppress(KeyboardInterrupt):
         print(bench.terminal.path, flush=True)
         bench.serve()
-    except KeyboardInterrupt:
-        pass
-    finally:
-        bench.close()
     return 0
 
 

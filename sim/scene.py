@@ -60,16 +60,12 @@ def set_scene(scheme: str, settings: Mapping[str, str]) -> Scene:
     InputError
         No protocol, a bad one, or a setting that makes no sense.
     """
-    rest = dict(settings)
-    source = rest.pop("protocol", "")
+    source, truth = settings.get("protocol"), settings.get("truth")
     if not source:
         raise InputError(
             f"{scheme}:// needs a scene to simulate", f"name one: {scheme}://?protocol=FILE.yaml"
         )
-    numbers = ("seed", "pace", "series")
-    seed, pace, series = (_number(scheme, name, rest.pop(name, "0")) for name in numbers)
-    truth = rest.pop("truth", "")
-    dials = read_dials(rest, scheme)
+    dials, seed, pace, series = read_disturbances(scheme, settings)
     path = Path(truth) if truth else None
     lab = hang_chains(reader.read(source), dials, seed, partial(append_truth, path))
     if path is not None:
@@ -77,6 +73,14 @@ def set_scene(scheme: str, settings: Mapping[str, str]) -> Scene:
     for each in (lab, *lab.others.values()):
         each.series = series
     return Scene(lab, dials, seed, pace)
+
+
+def read_disturbances(scheme: str, settings: Mapping[str, str]) -> tuple[Dials, int, int, int]:
+    """Return dials, seed, pace and series; arguments and errors as for `set_scene`."""
+    rest = {name: text for name, text in settings.items() if name not in {"protocol", "truth"}}
+    numbers = ("seed", "pace", "series")
+    seed, pace, series = (_number(scheme, name, rest.pop(name, "0")) for name in numbers)
+    return read_dials(rest, scheme), seed, pace, series
 
 
 def hang_chains(

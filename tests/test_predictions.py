@@ -9,7 +9,6 @@ from rig.analysis.curves import model_curves
 from rig.measurands import MEASURANDS
 from rig.predictions import predicted_run, predictions
 from rig.protocol import reader
-from rig.protocol.plan import runs
 from rig.tui.motion import motions
 from tests.cli.lab import PROTOCOLS, short
 from tests.tables import protocol_text, read_table
@@ -40,7 +39,7 @@ def test_all_who_predict_say_the_same(name):
         struck = line.get("impact_chain", "A")
         run = next(
             one
-            for one in runs(scene)
+            for one in scene.runs()
             if (one.incline_deg, one.impact) == (line["incline_deg"], struck)
         )
         expected = predicted_run(scene, run)

@@ -35,7 +35,6 @@ from rig.errors import InputError
 from rig.estimate.session import estimate
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
-from rig.protocol.plan import runs as planned
 from rig.text_table import text_table
 from rig.threads import one_thread
 
@@ -179,7 +178,7 @@ class Rig:
         dials = {name: f"{value:g}{DIALS[name][2]}" for name, value in self.dials.items()}
         dials |= {**WORLDS[self.world].settings, **(settings or {})}
         url = simulation(path, dials)
-        runs = [run.number for run in planned(reader.parse(self.text))]
+        runs = [run.number for run in reader.parse(self.text).runs()]
         return Asked(url, [self.seed], [runs])
 
     def row(self) -> dict[str, Any]:
@@ -270,7 +269,7 @@ def _draw(
     }
     text = json.dumps(scene)
     protocol = reader.parse(text)
-    count, drops = protocol.chains["A"].chain.rods, len(planned(protocol))
+    count, drops = protocol.chains["A"].chain.rods, len(protocol.runs())
     heights = _heights(scene)
     return Rig(world, number, seed, LAYOUTS[layout], heights, incline, count, drops, dials, text)
 

@@ -28,7 +28,6 @@ from rig.bench.findings import Findings
 from rig.clock.calibration import TimeScale
 from rig.commands.output import say
 from rig.protocol import reader
-from rig.protocol.plan import runs
 from rig.reasons import sentences
 from rig.text_table import text_table
 from rig.threads import one_thread
@@ -176,7 +175,7 @@ def cells(layout: GateLayout, drops: int, clean: int) -> list[DiagnosisTally]:
     with TemporaryDirectory() as folder:
         cases = [*_cases(layout, Path(folder), drops, clean)]
         protocol = reader.parse(layout.protocol())
-        planned = {run.number: run for run in runs(protocol)}
+        planned = {run.number: run for run in protocol.runs()}
         all_falls = falls([case.asked for case in cases])
         for case in cases:
             for fall in islice(all_falls, len(case.asked.seeds)):
@@ -189,7 +188,7 @@ def cells(layout: GateLayout, drops: int, clean: int) -> list[DiagnosisTally]:
 
 def _cases(layout: GateLayout, folder: Path, drops: int, clean: int) -> Iterator[_Case]:
     stated = layout.protocol()
-    numbers = [run.number for run in runs(reader.parse(stated))]
+    numbers = [run.number for run in reader.parse(stated).runs()]
     wanted = [
         (text, fault.settings(size), drops, fault.slow(size), fault.name, fault.words(size))
         for fault in WRONG_RIGS

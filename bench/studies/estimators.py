@@ -24,7 +24,6 @@ from rig.commands.bench_precision import Study
 from rig.commands.output import say
 from rig.errors import InputError
 from rig.protocol import reader
-from rig.protocol.plan import runs as planned
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -55,7 +54,7 @@ def run(arguments: Namespace) -> Iterator[Findings]:
     with TemporaryDirectory() as folder:
         path = with_repeats(arguments.protocol, arguments.repeats, Path(folder))
         protocol = reader.read(path)
-        numbers = [run.number for run in planned(protocol)]
+        numbers = [run.number for run in protocol.runs()]
         asked = Asked(simulation(path), [arguments.seed], [numbers])
         (session,) = without_device([(protocol, asked)])
     if not protocol.two_chains:

@@ -20,7 +20,6 @@ from rig.bench.findings import Findings
 from rig.commands.output import say
 from rig.measurands import MEASURANDS
 from rig.protocol import reader
-from rig.protocol.plan import runs
 from rig.threads import one_thread
 
 if TYPE_CHECKING:
@@ -94,7 +93,7 @@ def cells(layout: GateLayout, drops: int) -> list[Cell]:
         path = Path(folder) / "layout.yaml"
         path.write_text(layout.protocol(), encoding="utf-8")
         protocol = reader.read(path)
-        planned = {run.number: run for run in runs(protocol)}
+        planned = {run.number: run for run in protocol.runs()}
         numbers, rigs = [*planned], range(drops)
         plan = [[numbers[_STRIDE * rig % len(numbers)]] for rig in rigs]
         seeds = [1 + rig for rig in rigs]

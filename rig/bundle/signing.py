@@ -2,9 +2,8 @@
 
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from getpass import getpass
-from typing import TypeVar
 
 from minisign import Error, PublicKey, SecretKey, Signature
 
@@ -13,7 +12,6 @@ from rig.bundle.contents import WRONG
 from rig.files import read_input
 from rig.reasons import errors_become, rig_error
 
-Key = TypeVar("Key")
 _COMMENT = "rig export --bundle"
 _LONGEST = 4096
 """Bytes of a key file; minisign writes fewer than 300."""
@@ -27,16 +25,13 @@ def read_secret(key: str | os.PathLike[str]) -> SecretKey:
     InputError
         The key cannot be used; of one with a password, that there is no terminal to ask at.
     """
-
-    def unlock(content: bytes) -> SecretKey:
-        secret = SecretKey.from_bytes(content)
+    with errors_become("key_unusable", OSError, Error, path=key):
+        secret = SecretKey.from_bytes(read_input(key, _LONGEST))
         if secret.is_encrypted():
             if not sys.stdin.isatty():
                 raise rig_error("key_locked", path=key)
             secret.decrypt(getpass(f"password of {key}: "))
-        return secret
-
-    return _read_key(key, unlock)
+    return secret
 
 
 def sign(files: Mapping[str, bytes], secret: SecretKey) -> dict[str, bytes]:
@@ -62,7 +57,10 @@ def check_signature(files: Mapping[str, bytes], key: str | os.PathLike[str] | No
     InputError
         The key cannot be read, or is no public key of minisign.
     """
-    stated = None if key is None else _read_key(key, PublicKey.from_bytes)
+    stated = None
+    if key is not None:
+        with errors_become("key_unusable", OSError, Error, path=key):
+            stated = PublicKey.from_bytes(read_input(key, _LONGEST))
     try:
         public = stated or PublicKey.from_bytes(files.get(PUBLIC_KEY, b""))
         public.verify(files[SUMS], Signature.from_bytes(files.get(SIGNATURE, b"")))
@@ -70,9 +68,3 @@ def check_signature(files: Mapping[str, bytes], key: str | os.PathLike[str] | No
         return f"{WRONG}signature ({error})"
     whose = "compare it with the signer's own" if key is None else f"of {key}"
     return f"signature: right, by the key {public.to_base64().decode()} ({whose})"
-
-
-def _read_key(path: str | os.PathLike[str], read: Callable[[bytes], Key]) -> Key:
-    """Read a key file; minisign's complaints about it become ours."""
-    with errors_become("key_unusable", OSError, Error, path=path):
-        return read(read_input(path, _LONGEST))

@@ -99,7 +99,7 @@ class EffectFailure(NamedTuple):
 def effect_failure(ticket: int, error: RigError) -> EffectFailure:
     """Make the event of an error."""
     own = (error.reason, error.detail) if isinstance(error, DeviceRefusedError) else ()
-    return EffectFailure(ticket, f"{error.message}\n{error.hint}", *own)
+    return EffectFailure(ticket, error.two_lines, *own)
 
 
 class Tick(NamedTuple):

@@ -31,6 +31,7 @@ def _trials(protocol: Protocol) -> list[str]:
     """Say how many simulated drops the gates of a protocol identify, if it can be measured."""
     if protocol.thrown or not protocol.gates:
         return []
-    from rig.report.design import trials_line  # noqa: PLC0415 - numpy, only with gates
+    from rig.design.trials import trials  # noqa: PLC0415 - numpy, only with gates
+    from rig.report.templates import sentence  # noqa: PLC0415
 
-    return [trials_line(protocol)]
+    return [sentence("trials", trials(protocol), protocol.vocabulary)]

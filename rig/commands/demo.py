@@ -14,7 +14,6 @@ from rig.commands.output import Arguments, exit_code, goes_on, say
 from rig.files import make_folder, write_atomic
 from rig.measurands import MEASURANDS
 from rig.ports import truth_file
-from rig.protocol.plan import runs
 from rig.protocol.reader import parse
 from rig.ready import ready_protocol
 from rig.report.columns import table_parts
@@ -32,7 +31,7 @@ def main(arguments: Arguments) -> int:
     assert _REPEATS in text
     text = text.replace(_REPEATS, f"repeats: {arguments.repeats} ")
     write_atomic(protocol, text)
-    drops = len(runs(parse(text)))
+    drops = len(parse(text).runs())
     say(f"{drops} drops of two chains, {arguments.repeats} at each incline")
     with goes_on(
         f"rig demo -o {quote(str(folder))} --repeats {arguments.repeats} "

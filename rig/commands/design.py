@@ -14,7 +14,6 @@ from rig.files import write_atomic
 from rig.plain_data import attributes
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable
-from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
 from rig.reasons import rig_error
 from rig.report.design import design_lines
@@ -33,7 +32,7 @@ def main(arguments: Arguments) -> None:
     if limits.lowest > limits.highest:
         raise rig_error("beams_reversed")
     layouts = {
-        "runs": len(runs(protocol)),
+        "runs": len(protocol.runs()),
         "scatter": "learned" if learned else "stated",
         "current": _forecast(protocol, components),
     }

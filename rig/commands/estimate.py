@@ -23,7 +23,7 @@ def main(arguments: Arguments) -> int:
     analysis, simulated = outcome.analysis, outcome.simulated
     likeness = None if analysis.rig is None else analysis.rig.likeness
     sections, data = Sections(), {"simulated": simulated, **estimate.json()}
-    lines = ["SIMULATED DATA"] * simulated + [*estimate_lines(estimate, sections)]
+    lines = [*estimate_lines(estimate, sections)]
     if likeness is not None:
         data["likeness"] = likeness.json()
         lines[:0] = [likeness.sentence] * (not likeness.like)

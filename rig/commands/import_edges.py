@@ -16,7 +16,6 @@ from rig.clock.host import SystemClock
 from rig.commands.output import Arguments, say
 from rig.protocol import reader
 from rig.protocol.measurable import check_measurable, with_channels
-from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
 from rig.reasons import make_reason, reasons_json
 from rig.records import Drop
@@ -79,7 +78,7 @@ def import_with_protocol(protocol: Protocol, arguments: Arguments) -> Import:
 
 def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatch:
     """Compare the first drops with falls that the protocol has."""
-    planned = {run.number: run for run in runs(protocol)}
+    planned = {run.number: run for run in protocol.runs()}
     # Of gates that the file does not have nothing is due.
     protocol = with_channels(protocol, {*reading.edges.channel.tolist()})
     near, expected, evidence = 0, 0, 0.0
@@ -110,7 +109,7 @@ def fit_falls(protocol: Protocol, reading: FileReading, exact: bool) -> FallMatc
 
 def _check_plan(protocol: Protocol, drops: Sequence[Drop], source: str) -> None:
     """Refuse runs that are not planned; remark on channels that are not gates."""
-    planned = len(runs(protocol))
+    planned = len(protocol.runs())
     if run := min((drop.run for drop in drops if drop.run > planned), default=0):
         raise refusal(source, "run_not_planned", run=run, planned=planned)
     used = {edge.channel for drop in drops for edge in drop.edges}

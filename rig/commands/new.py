@@ -25,6 +25,8 @@ from rig.text_rows import read_rows, read_text
 
 _CHOICE = read_text(__file__, "choose.txt")
 """What somebody has, the ready protocol for it, and the command; README begins with it too."""
+_MOST = {"gates": GATES, "rods": 1000, "repeats": 1000}
+"""The largest number that an option accepts."""
 
 
 def main(arguments: Arguments) -> int:
@@ -68,8 +70,10 @@ def _read_answers(arguments: Arguments, path: Path) -> tuple[str, Draft]:
         if here and option not in answers:
             answers[option] = _ask(arguments, option, question, usual, " ".join(words).split())
     answers = {"rods": "1", "length": "", "incline": ""} | answers
-    for option, limit in {"gates": GATES, "rods": 1000, "repeats": 1000}.items():
-        answers[option] = _count(option, answers[option], limit)
+    for option, limit in _MOST.items():
+        if not _is_count(text := answers[option], limit):
+            raise rig_error("no_such_number", option=option, text=text, limit=limit)
+        answers[option] = int(text)
     title = arguments.title or path.stem.replace("-", " ").replace("_", " ")
     sizes = {name: answers[name] for name in Draft._fields if name in answers}
     return answers["board"], Draft(title=title, scene=scene, inclines=answers["incline"], **sizes)
@@ -90,18 +94,16 @@ def _ask(arguments: Arguments, option: str, words: str, usual: str, accepted: Se
     if not _can_ask(arguments):
         say(f"{words} {usual} (--{option})")
         return usual
-    choice = f" ({', '.join(accepted)})" if accepted else ""
+    choice, most = f" ({', '.join(accepted)})" if accepted else "", _MOST.get(option, 0)
     while True:
         answer = ask(f"{words}{choice} [{usual}] ") or usual
-        if not accepted or answer in accepted:
+        if answer in accepted or _is_count(answer, most) or not (most or accepted):
             return answer
-        say(f"  accepted: {', '.join(accepted)}")
+        say(f"  accepted: {', '.join(accepted) or f'a whole number from 1 to {most}'}")
 
 
-def _count(name: str, text: str, limit: int) -> int:
-    if not text.isdecimal() or not 1 <= int(text) <= limit:
-        raise rig_error("no_such_number", option=name, text=text, limit=limit)
-    return int(text)
+def _is_count(text: str, limit: int) -> bool:
+    return text.isdecimal() and 1 <= int(text) <= limit
 
 
 def _simulate(draft: Draft) -> int:

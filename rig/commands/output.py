@@ -83,6 +83,7 @@ def print_data(data: Mapping[str, Any], lines: Iterable[str], *, as_json: bool) 
     if as_json:
         print_json(data)
     else:
+        show(["SIMULATED DATA"] * bool(data.get("simulated")))
         show(lines)
 
 

@@ -13,7 +13,8 @@ _GO_ON = "  then press Enter (Ctrl-C stops; the same command continues) "
 
 def main(arguments: Arguments) -> int:
     """Carry out a protocol."""
-    operator = Operator(say, None if arguments.yes or not sys.stdin.isatty() else _ask)
+    is_alone = arguments.yes or not sys.stdin.isatty()
+    operator = Operator(say, None if is_alone else lambda request: ask(f"{request}\n{_GO_ON}"))
     with goes_on("the same command continues the session"):
         places = arguments.protocol, arguments.port, arguments.session
         outcome = run_protocol(*places, operator, arguments.seed, arguments.socket)
@@ -21,7 +22,3 @@ def main(arguments: Arguments) -> int:
     say(f"session: {arguments.session}")
     say(f"{sentence('counted', outcome.analysis)}." if outcome.blind else finding(outcome.analysis))
     return code
-
-
-def _ask(request: str) -> None:
-    ask(f"{request}\n{_GO_ON}")

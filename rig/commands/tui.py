@@ -11,7 +11,7 @@ from pathlib import Path
 from rig.commands.output import Arguments
 from rig.ctrl_c import signals_go_to
 from rig.daemon.socket_path import require_sockets
-from rig.ports import check_name
+from rig.link.port import check_url
 from rig.reasons import rig_error
 from rig.tui.app import RigApp
 from rig.tui.context import Options, ascii_only
@@ -54,7 +54,7 @@ def _options(arguments: Arguments) -> Options:
     offline = bool(arguments.session) and not live
     if not offline:
         require_sockets()
-    check_name(arguments.port or "")  # before a daemon is started for it
+    check_url(arguments.port or "")  # before a daemon is started for it
     fresh = f"{datetime.now(UTC):%Y%m%dT%H%M%SZ}.session"
     return Options(
         files=(Path(arguments.protocol),) if arguments.protocol else tuple(files),

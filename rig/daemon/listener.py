@@ -9,6 +9,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from rig.daemon.socket_path import prepare_folder
+from rig.files import stat_of
 from rig.reasons import rig_error
 
 _LOCK_S = 0.1  # one that ends takes its lock's file away, and the next tries again
@@ -81,7 +82,5 @@ class Door:
 
 def _identity(path: Path) -> tuple[int, int, int] | None:
     """Return what another file at a path has otherwise; its number alone may be the same."""
-    with suppress(OSError):
-        about = path.stat()
-        return about.st_dev, about.st_ino, about.st_mode
-    return None
+    about = stat_of(path)
+    return about and (about.st_dev, about.st_ino, about.st_mode)

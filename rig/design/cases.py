@@ -17,7 +17,6 @@ from rig.arrays import Array, Index
 from rig.estimate.hypotheses import model_alpha
 from rig.estimate.session import check_alike
 from rig.protocol.contact import of_run
-from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol, Run
 from rig.records import Drop
 from rig.threads import one_thread
@@ -84,7 +83,7 @@ def cases(protocol: Protocol, components: Components) -> tuple[Case, ...]:
         How much everything scatters.
     """
     check_alike(protocol)
-    counts = Counter(run.kind for run in runs(protocol))
+    counts = Counter(run.kind for run in protocol.runs())
     kinds = sorted(counts, key=lambda run: (run.incline_deg, str(run.impact)))
     models = []
     for run in kinds:

@@ -20,7 +20,6 @@ from rig.analysis.identify import LEAD, Identification, deciding_gate, identify,
 from rig.arrays import Index
 from rig.design.cases import CLOCK_U, perfect, predict_drop, with_edges
 from rig.protocol.contact import of_run
-from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol, Run
 from rig.threads import one_thread
 
@@ -61,7 +60,7 @@ def trials(protocol: Protocol, drops: int = DROPS) -> Trials:
         How many, in turn at all inclines and with either chain where they are unlike.
     """
     rng = np.random.default_rng(_SEED)
-    kinds = {run.kind: run for run in reversed(runs(protocol))}
+    kinds = {run.kind: run for run in reversed(protocol.runs())}
     read, failing = 0, Counter[str]()
     further_gate: tuple[str, float] | None = None
     for run in islice(cycle(kinds.values()), drops):
@@ -137,7 +136,7 @@ def margin(protocol: Protocol) -> float:
     edge seen where it should be; no more than `MARGIN`.
     """
     least, inclines = MARGIN, protocol.plan.inclines
-    ends = [run for run in runs(protocol) if run.incline_deg in {min(inclines), max(inclines)}]
+    ends = [run for run in protocol.runs() if run.incline_deg in {min(inclines), max(inclines)}]
     for run in {(run.incline_deg, run.setting): run for run in reversed(ends)}.values():
         here = of_run(protocol, run)
         model, x = predict_drop(here, run, priors(here))

@@ -72,9 +72,9 @@ def open_port(url: str) -> Port:
         code, text = _CODES.get(number, "port_failed"), _PLAIN.get(number, str(error))
         raise rig_error(code, port=url, text=text) from error
     except ValueError as error:
-        if scheme == "emu":  # pyserial says no more of a handler it cannot import
-            raise rig_error("emulator_missing") from error
-        raise rig_error("port_failed", port=url, text=error) from error
+        # Pyserial says no more of a handler it cannot import.
+        code = "emulator_missing" if scheme == "emu" else "port_failed"
+        raise rig_error(code, port=url, text=error) from error
 
 
 def check_url(url: str) -> None:
@@ -83,12 +83,14 @@ def check_url(url: str) -> None:
     Raises
     ------
     InputError
-        No such kind of URL, or a simulation's with a name that means nothing.
+        No such kind of URL, or a simulation's with a name or a setting that means nothing.
     """
     check_name(url)
     _add_handlers()
     with errors_become("not_a_port", ValueError, port=url):
-        serial.serial_for_url(url, do_not_open=True)
+        port = serial.serial_for_url(url, do_not_open=True)
+    if hasattr(port, "check_settings"):  # a simulation's
+        port.check_settings()
 
 
 def _add_handlers() -> None:

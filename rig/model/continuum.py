@@ -33,8 +33,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from rig.errors import DomainError
-from rig.model.fall import Fall, free_leg, never_falls
+from rig.model.fall import Fall, free_leg
 from rig.model.quadrature import gauss
+from rig.reasons import rig_error
 
 _FARTHEST = 45.0
 """Largest x of the integrals: beyond are e^−45 of the chain, and 1e-18 of Δz and of t."""
@@ -81,7 +82,7 @@ class UniformChain:
         if self.length_m == 0.0:
             raise DomainError("length_m = 0: there is no chain")
         if self.gravity == 0.0 and self.initial_speed == 0.0:
-            raise never_falls()
+            raise rig_error("never_falls")
 
     @property
     def reach_m(self) -> float:

@@ -21,9 +21,9 @@ from itertools import accumulate
 from math import atanh, cos, exp, expm1, inf, log, log1p, radians, sinh, sqrt, tanh
 from operator import mul
 
-from rig.errors import DomainError
 from rig.model.chain import Chain
 from rig.model.fall import Fall, checked_fall
+from rig.reasons import rig_error
 
 
 def leg_drags(chain: Chain, drags: Sequence[float]) -> list[float]:
@@ -128,10 +128,7 @@ def drag_leg(distance: float, speed: float, gravity: float, kappa: float) -> tup
     reach = 2.0 * distance * _per(expm1, -2.0 * kappa * distance)
     arrival = sqrt(speed * speed * decay + gravity * reach)
     if arrival == 0.0:
-        raise DomainError(
-            "the chain never arrives: no gravity, and no speed or too much drag",
-            "give a gravity above zero",
-        )
+        raise rig_error("never_arrives")
     slow = reach / (arrival + decay * speed)
     rate = sqrt(kappa * gravity)
     if rate * slow < 0.5:

@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
-from rig.errors import DomainError
 from rig.model.chain import Chain
+from rig.reasons import rig_error
 
 if TYPE_CHECKING:
     from rig.model.impact import Number
@@ -152,7 +152,7 @@ def fall(
         initial_speed = math.ldexp(initial_speed, -unit)
     arrival, time = free_leg(drop, initial_speed, gravity)
     if arrival == 0.0 == gravity:
-        raise never_falls()
+        raise rig_error("never_falls")
     try:
         ends = after_impacts(chain.legs, alpha, gamma, arrival, time, 2.0 * gravity, math.sqrt)
     except ZeroDivisionError:
@@ -209,10 +209,7 @@ def checked_fall(separation: float, speed: float, time: float) -> Fall:
         A number has left the range of floats.
     """
     if not math.isfinite(separation + speed + time):
-        raise DomainError(
-            "the chain's speed leaves the range of numbers",
-            "an impact may bring too much energy (alpha above ½), or lift next to no mass",
-        )
+        raise rig_error("speed_unbounded")
     return Fall(separation, speed, time)
 
 
@@ -228,7 +225,7 @@ def free_leg(distance: float, speed: float, gravity: float, _rod: int = 0) -> tu
         return speed, 0.0
     arrival = math.sqrt(speed * speed + 2.0 * gravity * distance)
     if speed + arrival == 0.0:
-        raise never_falls()
+        raise rig_error("never_falls")
     return arrival, 2.0 * distance / (speed + arrival)
 
 
@@ -239,10 +236,3 @@ def air_legs(kappas: Sequence[float]) -> Leg:
     from rig.model.drag import drag_leg  # noqa: PLC0415 - only where there is air
 
     return lambda distance, speed, gravity, rod: drag_leg(distance, speed, gravity, kappas[rod])
-
-
-def never_falls() -> DomainError:
-    """Return the error for a scene in which the chain would never move."""
-    return DomainError(
-        "the chain never falls: no gravity and no initial speed", "give a gravity above zero"
-    )

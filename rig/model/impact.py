@@ -6,8 +6,8 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from rig.errors import DomainError
 from rig.model.chain import UNIFORM_ROD_INERTIA, Chain
+from rig.reasons import rig_error
 from rig.units import Quantity
 
 if TYPE_CHECKING:
@@ -77,11 +77,8 @@ def alpha_inclined(
     free_rod = gamma_finite(inertia, inertia_z)
     g = contact_share(sin, cos, friction, free_rod)
     if g <= 0.0:
-        raise DomainError(
-            f"Eq. 13 is singular: g(θ) ≤ 0 at incline {incline_deg:g}°, "
-            f"friction {friction:g}, inertia {inertia:g}",
-            "use a steeper incline or a smaller friction: the rod must slide (tan θ > μ)",
-        )
+        inputs = {"incline_deg": incline_deg, "friction": friction, "inertia": inertia}
+        raise rig_error("eq13_singular", **inputs)
     return alpha_level(restitution, inertia) * cos / g
 
 

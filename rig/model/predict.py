@@ -12,6 +12,7 @@ from rig.model.fall import Fall, air_legs, fall, kicks
 from rig.model.impact import ALPHA, MU, impact_on, stated_coefficients, with_coefficients
 from rig.model.prediction import PredictedIncline
 from rig.model.surface import Surface
+from rig.reasons import rig_error
 from rig.units import Quantity
 
 AT_REST = Quantity(0.0)
@@ -60,7 +61,8 @@ def predict(
         notes=[],
     )
     try:
-        _check_order(chain, drop.value)
+        if min([drop.value, *(gap for gap, _ in chain.legs)]) < 0.0:
+            raise rig_error("rods_not_in_turn")
         impact = impact_on(surface, chain, incline_deg)
     except DomainError as error:
         return replace(result, notes=[error.message])
@@ -117,15 +119,6 @@ def predict(
         slopes=slopes,
         **values,
     )
-
-
-def _check_order(chain: Chain, drop_m: float) -> None:
-    """Raise an error unless rods strike after the release, and from the bottom up."""
-    if min([drop_m, *(gap for gap, _ in chain.legs)]) < 0.0:
-        raise DomainError(
-            "a rod touches the surface before the release or before a lower rod",
-            "release the chain higher, or make the surface less steep",
-        )
 
 
 def expected_alpha(chain: Chain, surface: Surface, incline_deg: float) -> Quantity:

@@ -1,14 +1,17 @@
 """A protocol file from a few answers, with comments, and gates at suitable heights."""
 
 import json
+from collections.abc import Mapping, Sequence
 from itertools import count, pairwise
-from string import Template
 from typing import Literal, NamedTuple, Self, get_args
+
+from jinja2 import Environment, StrictUndefined
 
 from rig.errors import InputError
 from rig.protocol.keys import KEYS
 from rig.protocol.protocol import Protocol, Side
 from rig.protocol.reader import parse
+from rig.reasons import rig_error
 from rig.text_rows import read_rows, read_text
 
 Scene = Literal["two-chains", "one-chain", "object", "track", "picket-fence"]
@@ -63,7 +66,7 @@ def draft_text(draft: Draft) -> str:
         The answers do not make a protocol; lists the fault of each.
     """
     try:
-        bare = parse(_text(draft, ""), draft.title)
+        bare = parse(_text(draft, {}), draft.title)
     except InputError as error:
         messages = [f"{problem.key}: {problem.message}" for problem in error.problems]
         raise InputError("; ".join(messages) or str(error), "rig new --help") from None
@@ -72,32 +75,22 @@ def draft_text(draft: Draft) -> str:
     return text
 
 
-_WIDTH = 26
-_LINES = read_text(__file__).splitlines()
-"""Lines of a file after the scenes that have them; all scenes if none is named."""
+_TEMPLATES = Environment(trim_blocks=True, undefined=StrictUndefined)  # noqa: S701 - no page
 
 
-def _text(draft: Draft, gates: str) -> str:
+def _text(draft: Draft, gates: Mapping[Side, Sequence[tuple[int, float]]]) -> str:
     """Return the text of the file with these gates; defaults are those of the table of keys."""
-    scenes = ((line[:_WIDTH].split(), line[_WIDTH:]) for line in _LINES)
-    lines = [text for scenes_of_line, text in scenes if draft.scene in (scenes_of_line or SCENES)]
-    values = {name: str(getattr(draft, name)) for name in Draft._fields}
-    values |= {path.replace(".", "_"): key.default for path, key in KEYS.items() if "." in path}
-    values |= {"title": json.dumps(draft.title, ensure_ascii=False), "gates": gates}
-    return Template("\n".join(lines) + "\n").substitute(values)
+    values = draft._asdict() | {"title": json.dumps(draft.title, ensure_ascii=False)}
+    return _TEMPLATES.from_string(read_text(__file__)).render(values, gates=gates, keys=KEYS) + "\n"
 
 
-def _gates(protocol: Protocol, draft: Draft) -> str:
-    """Return the ``gates`` of the file, at heights that hanging rods leave clear."""
-    text, channels = "gates:\n", count()
-    for side, number in _share_gates(draft).items():
-        heights = (
-            _low_and_high(protocol, side, number) if protocol.surface else _even(protocol, number)
-        )
-        text += f"  {side}:\n"
-        for height in sorted(heights):
-            text += f"    - {{channel: {next(channels)}, height: {height * 1e3:.1f} mm}}\n"
-    return text + "  height_uncertainty: 0.5 mm   # of each beam\n"
+def _gates(protocol: Protocol, draft: Draft) -> dict[Side, list[tuple[int, float]]]:
+    """Return channels and heights (m) of gates that hanging rods leave clear, the lowest first."""
+    place, channels = _low_and_high if protocol.surface else _even, count()
+    return {
+        side: [(next(channels), height) for height in sorted(place(protocol, side, number))]
+        for side, number in _share_gates(draft).items()
+    }
 
 
 def _share_gates(draft: Draft) -> dict[Side, int]:
@@ -105,8 +98,7 @@ def _share_gates(draft: Draft) -> dict[Side, int]:
     if draft.scene != "two-chains":
         return {"impact" if draft.scene == "one-chain" else "free": draft.gates}
     if draft.gates < 2:
-        hint = "for one gate use --scene one-chain"
-        raise InputError("two chains need two gates, one on each side", hint)
+        raise rig_error("gates_too_few")
     impact = 1 if draft.gates < 5 else draft.gates // 2
     return {"impact": impact, "free": draft.gates - impact}
 
@@ -129,12 +121,11 @@ def _low_and_high(protocol: Protocol, side: Side, number: int) -> list[float]:
         gaps.remove(gap)
         heights.append(gap)
     if len(heights) < number:
-        hint = f"use {len(heights)} a side, a longer drop or thinner rods"
-        raise InputError(f"there is no space for {number} gates on one side", hint)
+        raise rig_error("gates_too_many", gates=number, fitting=len(heights))
     return heights
 
 
-def _even(protocol: Protocol, number: int) -> list[float]:
+def _even(protocol: Protocol, _: Side, number: int) -> list[float]:
     """Return even heights from near the lowest level up to just below the start, m."""
     (body,), drop = protocol.chains.values(), protocol.drop
     clear = max(body.widths) / 2.0 + max(_CLEAR, drop.u)

@@ -11,7 +11,7 @@ from rig.boards import BOARDS, LONGEST_RECORD_MS, Capabilities
 from rig.errors import InputError, Problem
 from rig.protocol.protocol import SIDES, Gate, Protocol
 from rig.protocol.yamltree import load, place_of
-from rig.reasons import rig_error
+from rig.reasons import make_reason, rig_error
 
 LEAST_RECORD_MS = 1500
 """Length of a recording that suits most labs, ms."""
@@ -96,12 +96,9 @@ def too_long(protocol: Protocol) -> Problem | None:
     """Return the problem of a fall longer than any board's recording; `None` otherwise."""
     if record_ms(protocol) <= LONGEST_RECORD_MS:
         return None
-    message = (
-        f"from here a drop takes up to {longest_fall(protocol):.3g} s and needs a recording of "
-        f"{record_ms(protocol) / 1e3:.3g} s; boards record for at most "
-        f"{LONGEST_RECORD_MS / 1e3:g} s: shorten the drop"
-    )
-    return _locate(protocol, message, "drop")
+    times = {"fall_s": longest_fall(protocol), "needed_s": record_ms(protocol) / 1e3}
+    why = make_reason("recording_too_long", **times, limit_s=LONGEST_RECORD_MS / 1e3)
+    return _locate(protocol, why.text, "drop")
 
 
 def _locate(protocol: Protocol, message: str, *path: str | int) -> Problem:

@@ -7,6 +7,7 @@ empty, and every later stage leaves it out.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import product
 from math import cos, hypot, radians, sin
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 Side = Literal["impact", "free"]
 Order = Literal["ABBA", "alternate", "fixed"]
+# Which chain is on the impact side, repeating. ABBA cancels a drift that is linear in time.
+PATTERNS: dict[Order, tuple[int, ...]] = {"ABBA": (0, 1, 1, 0), "alternate": (0, 1), "fixed": (0,)}
 STANDARD_GRAVITY: Quantity = DEFAULTS["gravity"]
 SIDES: tuple[Side, ...] = ("impact", "free")
 
@@ -214,7 +217,7 @@ class ReleasePulse(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """Layout of the runs, expanded by `rig.protocol.plan.runs`."""
+    """Layout of the runs, expanded by `Protocol.runs`."""
 
     inclines: tuple[float, ...] = DEFAULTS["plan.incline"]
     repeats: int = DEFAULTS["plan.repeats"]
@@ -413,6 +416,44 @@ class Protocol:
         chain = run.impact if unlike else None
         return Condition(run.incline_deg, chain, run.setting if is_apart else "")
 
+    def runs(self) -> tuple[Run, ...]:
+        """Return all planned runs.
+
+        At each incline and setting the impact chain of runs 1, 2, 3, 4 … is A, B, B, A …
+        (``ABBA``), A, B, A, B … (``alternate``) or always A (``fixed``), A being the chain named
+        first. ``randomize: incline`` shuffles inclines and settings together, and leaves each
+        block whole; ``randomize: all`` shuffles the runs themselves, so each chain keeps its
+        number of impacts in each case.
+
+        Returns
+        -------
+        tuple of Run
+            A run for each incline, setting and repeat, numbered from 1 in the order of execution.
+            The same protocol gives the same runs on every machine.
+        """
+        plan = self.plan
+        cases = list(product(plan.inclines, self.settings))
+        if plan.randomize == "incline":
+            _shuffle(cases, plan.seed)
+        pattern = PATTERNS[plan.order]
+        drops = [
+            (incline, *self._sides(pattern[repeat % len(pattern)]), setting)
+            for incline, setting in cases
+            for repeat in range(plan.repeats)
+        ]
+        if plan.randomize == "all":
+            _shuffle(drops, plan.seed)
+        return tuple(Run(number, *drop) for number, drop in enumerate(drops, start=1))
+
+    def _sides(self, first: int) -> tuple[str | None, str | None]:
+        """Return the names of the chains on the impact and the free side."""
+        names = list(self.chains)
+        if self.surface is None:
+            return None, names[0]
+        if len(names) == 1:
+            return names[0], None
+        return names[first], names[1 - first]
+
 
 class Condition(NamedTuple):
     """Condition that runs must share for their results to be averaged.
@@ -469,3 +510,17 @@ class Run(Record):
         """What is set before the drop, in words: the incline, and the keys that the plan varies."""
         incline = "" if self.impact is None else f"{self.incline_deg:g}°"
         return ", ".join(filter(None, (incline, self.setting)))
+
+
+def _shuffle(items: list[Any], seed: int) -> None:
+    """Shuffle by Fisher and Yates, the same everywhere.
+
+    Python promises the sequence of ``random()`` for a given seed across versions and platforms,
+    but not what ``shuffle()`` makes of it.
+    """
+    import random  # noqa: PLC0415 - most plans are not shuffled
+
+    source = random.Random(seed)
+    for last in reversed(range(1, len(items))):
+        swap = int(source.random() * (last + 1))
+        items[last], items[swap] = items[swap], items[last]

@@ -19,6 +19,7 @@ from rig.protocol.keys import Plain
 from rig.protocol.site import gravity_at
 from rig.protocol.variants import vary
 from rig.protocol.yamltree import Node, load, place_at
+from rig.reasons import errors_become, rig_error
 from rig.units import Quantity
 
 if TYPE_CHECKING:
@@ -48,16 +49,13 @@ def read(path: str | os.PathLike[str]) -> scene.Protocol:
         If the file cannot be read, or with every problem found in it.
     """
     source = str(path)
-    try:
+    with (
+        errors_become("protocol_unreadable", OSError, ValueError, path=source),  # a zero byte
+        errors_become("protocol_absent", FileNotFoundError, path=source),
+    ):
         data = read_input(path, MAX_BYTES + 1)
-    except FileNotFoundError:
-        hint = "rig new FILE.yaml writes a protocol; rig ready lists ready protocols"
-        raise InputError(f"{source}: there is no such file", hint) from None
-    except (OSError, ValueError) as error:  # ValueError: a name with a zero byte
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{source!r}: cannot be read: {reason}") from None
     if len(data) > MAX_BYTES:
-        raise InputError(f"{source}: larger than {MAX_BYTES} bytes; a protocol is a text file")
+        raise rig_error("protocol_too_large", path=source, limit=MAX_BYTES)
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -92,7 +90,7 @@ def parse(text: str, source: str = "protocol", *, kept: bool = False) -> scene.P
         The text has problems; lists all.
     """
     if len(text) > MAX_BYTES:
-        raise InputError(f"{source}: larger than {MAX_BYTES} bytes; a protocol is a text file")
+        raise rig_error("protocol_too_large", path=source, limit=MAX_BYTES)
     root, faults = load(text, source), Faults(source)
     scenes = {at: _read_scene(root, text, faults, kept=kept) for at in vary(root, faults)}
     if faults.problems:

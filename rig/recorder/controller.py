@@ -9,7 +9,7 @@ from rig.link.exchange import Halted
 from rig.link.messages import TEST_RUN, Identity, RefusalReason
 from rig.link.port import Port
 from rig.link.refusals import DeviceRefusedError
-from rig.ports import fill_url, is_simulated
+from rig.ports import fill_url, is_simulated, truth_file
 from rig.protocol import reader
 from rig.protocol.measurable import check_gates, check_recordable
 from rig.protocol.protocol import Protocol
@@ -127,7 +127,8 @@ class Controller:
                 self.close_session()
             finally:
                 if empty:
-                    path.unlink(missing_ok=True)
+                    for file in (path, truth_file(path)):
+                        file.unlink(missing_ok=True)
             raise
         about, plan = describe_session(opened, scene)
         log.info("session: %s", path)

@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from rig.ports import is_simulated, truth_file
-from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
 from rig.reasons import rig_error
 from rig.recorder.run_lines import plan_lines
@@ -46,7 +45,7 @@ def latest_board(session: Reader) -> dict[str, str]:
 
 def describe_session(session: Reader, protocol: Protocol) -> tuple[dict[str, Any], list[Any]]:
     """Describe a session and its plan as the sections ``session`` and ``runs`` of the state do."""
-    plan = [line.json() for line in plan_lines(runs(protocol), session.states())]
+    plan = [line.json() for line in plan_lines(protocol.runs(), session.states())]
     about = {
         "path": str(session.path),
         "source": session.protocol_source,

@@ -3,9 +3,9 @@
 import json
 from pathlib import Path
 
-from rig.errors import SessionError
 from rig.files import read_input
 from rig.ports import is_simulated
+from rig.reasons import errors_become, rig_error
 from rig.recover.examine import ExaminedFile
 from rig.session.schema import OLDER, RunState
 from rig.session.store import Session
@@ -34,7 +34,7 @@ def save(examined: ExaminedFile, target: str | Path, protocol: str | None = None
         It is not a session, its protocol is lost and not given, or the new file cannot be created.
     """
     if examined.foreign:
-        raise SessionError(f"{examined.snapshot.path} is not a session file: {examined.foreign}")
+        raise rig_error("not_a_session", path=examined.snapshot.path, text=examined.foreign)
     rows = examined.rows
     source, text = _protocol(examined, protocol)
     simulated, notes = _find_world(examined)
@@ -51,15 +51,11 @@ def save(examined: ExaminedFile, target: str | Path, protocol: str | None = None
 
 def _protocol(examined: ExaminedFile, file: str | None) -> tuple[str, str]:
     if file is not None:
-        try:
+        with errors_become("protocol_unreadable", OSError, UnicodeDecodeError, path=file):
             return Path(file).name, read_input(file).decode()
-        except (OSError, UnicodeDecodeError) as error:
-            raise SessionError(f"cannot read {file}: {error}") from error
-    rows = examined.rows
-    if rows.protocol is None or rows.protocol_altered:
-        path = examined.snapshot.path
-        raise SessionError(f"{path} has lost its protocol file", "give it: --protocol FILE")
-    return rows.protocol
+    if examined.rows.protocol is None or examined.rows.protocol_altered:
+        raise rig_error("protocol_lost", path=examined.snapshot.path)
+    return examined.rows.protocol
 
 
 def _find_world(examined: ExaminedFile) -> tuple[bool, list[str]]:

@@ -25,7 +25,6 @@ def shared_lines(results: TogetherResults) -> list[str]:
 
 def pooled_lines(results: TogetherResults) -> Iterator[str]:
     """Yield the means over all sessions of each scene, as lines of text."""
-    yield from ["SIMULATED DATA"] * results.simulated
     for names, summary in results.pooled.items():
         yield from [f"{', '.join(names)}:", *summary_table(summary).splitlines()]
     yield from shared_lines(results)
@@ -33,7 +32,6 @@ def pooled_lines(results: TogetherResults) -> Iterator[str]:
 
 def difference_lines(results: TogetherResults) -> Iterator[str]:
     """Yield the means of every session and their differences, as lines of text."""
-    yield from ["SIMULATED DATA"] * results.simulated
     for part in _tables(results):
         yield from ["", *part.table]
     yield from ["", *_claims(results)]

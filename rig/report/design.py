@@ -3,9 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from rig.design.trials import trials
 from rig.measurands import MEASURANDS
-from rig.protocol.protocol import Protocol
 from rig.report.estimate import symbol
 from rig.report.numbers import decimals_for, fixed
 from rig.report.templates import sentence
@@ -19,11 +17,6 @@ def design_lines(design: Mapping[str, Any]) -> list[str]:
     rows = [[name, *(column[name] for column in cells)] for name in cells[0]]
     table = text_table([["quantity", *layouts], *rows], left={0}, rule=True)
     return sentence("design", design, table).split("\n")
-
-
-def trials_line(protocol: Protocol) -> str:
-    """Say how many simulated drops the gates of a protocol identify."""
-    return sentence("trials", trials(protocol), protocol.vocabulary)
 
 
 def _uncertainties(layout: Mapping[str, Any]) -> dict[str, str]:

@@ -5,7 +5,7 @@ from functools import partial
 from typing import Any
 
 from rig.estimate.alphas import ConditionAlpha
-from rig.estimate.rods import Gain, resolution
+from rig.estimate.rods import resolution
 from rig.estimate.session import Coefficient, Coefficients, SessionEstimate, is_identified
 from rig.report.columns import TABLES, Part, records_in, table_parts
 from rig.report.numbers import MINUS, decimals_for, fixed, plus_minus
@@ -75,16 +75,11 @@ def _worst(compared: Iterable[Any]) -> float | None:
     return max((abs(error) for error in errors if error is not None), default=None)
 
 
-def _rod(gain: Gain) -> str:
-    """Return the numbers of rods as text, counted from 1."""
-    return "–".join(str(1 + rod) for rod in dict.fromkeys((gain.first, gain.last)))
-
-
 _CELLS: dict[str, Callable[[Any], Any]] = {
     "symbol": symbol,
     "posterior": _posterior,
     "stated": _format_stated,
     "source": lambda coefficient: "edges" if coefficient.identified else "held",
     "worst": _worst,
-    "rod": _rod,
+    "rod": lambda gain: "–".join(str(1 + n) for n in dict.fromkeys((gain.first, gain.last))),
 }

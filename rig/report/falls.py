@@ -8,7 +8,7 @@ those of the session's results.
 
 from collections.abc import Iterator
 from fractions import Fraction
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -23,6 +23,8 @@ from rig.report.figure import Chart, chart
 from rig.report.numbers import with_unit
 
 _MOMENTS = 200
+TimedDrop: TypeAlias = tuple[Drop, float | Fraction, DropResult]
+"""A drop, calibrated ticks per second, and its result with the matches of edges to rods."""
 
 
 class Passages(NamedTuple):
@@ -46,20 +48,15 @@ class Passages(NamedTuple):
         return self.speed**2
 
 
-def passages(
-    protocol: Protocol, drop: Drop, hz: float | Fraction, result: DropResult, side: Side
-) -> Passages:
+def passages(protocol: Protocol, timed: TimedDrop, side: Side) -> Passages:
     """Return the points of a chain or object from its matched edges.
 
     Parameters
     ----------
-    hz
-        Calibrated ticks per second.
-    result
-        Result with the matches of edges to rods.
     side
         Side of the gates.
     """
+    drop, hz, result = timed
     name = result.run.impact if side == "impact" else result.run.free
     gates = {gate.channel: gate for gate in protocol.gates.on(side)}
     row = acceleration_in(result.quantities)
@@ -82,15 +79,14 @@ def passages(
     return Passages(*np.array(sorted(rows)).reshape(-1, 3).T)
 
 
-def fall_figures(
-    protocol: Protocol, drop: Drop, hz: float | Fraction, result: DropResult
-) -> Iterator[Chart]:
+def fall_figures(protocol: Protocol, timed: TimedDrop) -> Iterator[Chart]:
     """Yield the figures of a good drop: its fall first, then those of the impacts."""
+    result = timed[-1]
     run, values, head = result.run, result.quantities, f"Run {result.run.number}"
     protocol = of_run(protocol, run)
     if result.verdict not in GOOD:
         return
-    struck, free = (passages(protocol, drop, hz, result, side) for side in ("impact", "free"))
+    struck, free = (passages(protocol, timed, side) for side in ("impact", "free"))
     if run.impact is None:
         if free.time.size > 2:
             yield chart("object", _object(protocol, free, result), run=head)

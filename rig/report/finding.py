@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 from rig.analysis.session import Analysis
 from rig.analysis.summary import Incline
 from rig.measurands import ACCELERATION, GRAVITY, Measurand, acceleration_in, averaged
-from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Protocol
 from rig.reasons import remedies, summarize_reasons
 from rig.report.numbers import plus_minus
@@ -153,4 +152,4 @@ def deviations(protocol: Protocol, analysis: Analysis, states: Sequence[StateEnt
     """
     first = dict.fromkeys(entry.run for entry in states if entry.state is RunState.RECORDED)
     late = [after for before, after in pairwise(first) if after < before]
-    return lines("deviations", analysis, states, planned_runs(protocol), late) or [NONE]
+    return lines("deviations", analysis, states, protocol.runs(), late) or [NONE]

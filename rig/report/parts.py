@@ -71,11 +71,6 @@ def means_of(summary: Sequence[Incline], *rows: Measurand) -> list[Mean]:
     ]
 
 
-def summary_incline(line: Incline) -> str:
-    """Return the inclination of a mean as text; empty without a surface."""
-    return "" if acceleration_in(line.means) else degrees(line.condition.incline_deg)
-
-
 def means_parts(summary: Sequence[Incline]) -> list[Part]:
     """Return tables of means with the model's values, with a line for each unlike chain."""
     return [part for row in averaged() for part in tables("model", means_of(summary, row), row=row)]
@@ -87,7 +82,9 @@ def scatter_parts(summary: Sequence[Incline]) -> Iterator[Part]:
 
 
 _CELLS: dict[str, Callable[[Any], str]] = {
-    "incline": summary_incline,
+    "incline": lambda line: (
+        "" if acceleration_in(line.means) else degrees(line.condition.incline_deg)
+    ),
     "prior_incline": lambda move: (
         "" if acceleration_in([move["quantity"]]) else degrees(move["incline_deg"])
     ),

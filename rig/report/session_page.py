@@ -11,14 +11,12 @@ from typing import Any
 
 from rig import __version__
 from rig.analysis import curves
-from rig.analysis.result import GOOD, DropResult
+from rig.analysis.result import GOOD
 from rig.estimate.session import SessionEstimate
 from rig.measurands import SEPARATION
-from rig.protocol import plan
 from rig.protocol.protocol import Protocol
-from rig.records import Drop
 from rig.report import attachments, estimate, figures, finding, parts, timeline
-from rig.report.falls import fall_figures
+from rig.report.falls import TimedDrop, fall_figures
 from rig.report.figure import Chart
 from rig.report.numbers import value_of
 from rig.report.parts import Bars
@@ -83,13 +81,11 @@ def _make(sections: Sections, words: str, make: Callable[..., Any], *arguments: 
     return listed
 
 
-def _best_fall(
-    protocol: Protocol, timed: Iterable[tuple[Drop, Any, DropResult]]
-) -> Iterator[Chart]:
+def _best_fall(protocol: Protocol, timed: Iterable[TimedDrop]) -> Iterator[Chart]:
     """Return the figures of the good run with the largest separation, or of the first."""
     good = [drop for drop in timed if drop[-1].verdict in GOOD]
     good.sort(key=lambda drop: -(value_of(drop[-1].quantities.get(SEPARATION.name)) or 0.0))
-    return fall_figures(protocol, *good[0]) if good else iter(())
+    return fall_figures(protocol, good[0]) if good else iter(())
 
 
-_MODULES = attachments, curves, estimate, figures, finding, improvements, parts, plan, timeline
+_MODULES = attachments, curves, estimate, figures, finding, improvements, parts, timeline

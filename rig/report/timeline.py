@@ -11,6 +11,7 @@ from typing import NamedTuple
 from rig.analysis.result import DropResult
 from rig.protocol.protocol import Gate
 from rig.records import Drop
+from rig.report.falls import TimedDrop
 
 _LEFT, _WIDTH, _LANE = 112, 640, 15
 _STEPS_MS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
@@ -44,9 +45,7 @@ class Timeline(NamedTuple):
     odd: str
 
 
-def timelines(
-    gates: Sequence[Gate], timed: Sequence[tuple[Drop, float | Fraction, DropResult]]
-) -> tuple[Lanes, list[Timeline]]:
+def timelines(gates: Sequence[Gate], timed: Sequence[TimedDrop]) -> tuple[Lanes, list[Timeline]]:
     """Return the timelines of blocked beams, within the limit of size.
 
     Parameters
@@ -60,7 +59,7 @@ def timelines(
         Common layout, and the timelines of the drops that fit.
     """
     shared = lanes(gates, timed)
-    drawn = [timeline(shared, *drop) for drop in timed]
+    drawn = [timeline(shared, drop) for drop in timed]
     # If not all fit, drops that are not accepted come first.
     drawn.sort(key=lambda drop: drop.result.verdict == "accepted")
     sizes = accumulate(len(drop.bars) + len(drop.odd) + _AROUND for drop in drawn)
@@ -69,16 +68,14 @@ def timelines(
     ]
 
 
-def lanes(
-    gates: Sequence[Gate], timed: Sequence[tuple[Drop, float | Fraction, DropResult]]
-) -> Lanes:
+def lanes(gates: Sequence[Gate], timed: Sequence[TimedDrop]) -> Lanes:
     """Return the layout: gates sorted with the impact side first, and the time range."""
     ordered = sorted(gates, key=lambda gate: (gate.side != "impact", -gate.height))
     spans = [times[-1] for drop, hz, _ in timed if (times := _times_ms(drop, hz))] or [1.0]
     return Lanes(tuple(ordered), max(1.0, min(max(spans), _LONGEST * median(spans))))
 
 
-def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult) -> Timeline:
+def timeline(lanes: Lanes, timed: TimedDrop) -> Timeline:
     """Return the timeline of a drop's blocked beams.
 
     Parameters
@@ -92,6 +89,7 @@ def timeline(lanes: Lanes, drop: Drop, hz: float | Fraction, result: DropResult)
     result
         Result with the matched edges; without matches, no edge counts as unexplained.
     """
+    drop, hz, result = timed
     end = _FINE * _WIDTH
     places = [round(ms * end / lanes.span_ms) for ms in _times_ms(drop, hz)]
     bars, marks, matches = "", "", result.matches

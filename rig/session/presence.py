@@ -4,7 +4,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
-from rig.files import beside
+from rig.files import beside, stat_of
 
 
 class Presence:
@@ -21,14 +21,14 @@ class Presence:
 
     def __init__(self, path: Path) -> None:
         self._path, self._log = path, beside(path, "-wal")
-        self._known = {file: _stat(file) for file in (path, self._log)}
+        self._known = {file: stat_of(file) for file in (path, self._log)}
 
     def remove_log(self) -> None:
         """Remove the empty log of a file that has moved.
 
         SQLite leaves the log, and would apply it to any other file at this path.
         """
-        known, now = self._known[self._log], _stat(self._log)
+        known, now = self._known[self._log], stat_of(self._log)
         if known and now and os.path.samestat(known, now) and now.st_size == 0:
             with suppress(OSError):
                 self._log.unlink()
@@ -37,7 +37,7 @@ class Presence:
     def trouble(self) -> str:
         """Return in words what happened to the file; empty if it is unchanged."""
         for path, before in self._known.items():
-            now = _stat(path)
+            now = stat_of(path)
             if before is not None:
                 if now is None:
                     return f"{path} was deleted or moved"
@@ -47,9 +47,3 @@ class Presence:
                     return f"{path} was cut from {before.st_size} to {now.st_size} bytes"
             self._known[path] = now
         return ""
-
-
-def _stat(path: Path) -> os.stat_result | None:
-    with suppress(OSError):
-        return path.stat()
-    return None

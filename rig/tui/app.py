@@ -18,6 +18,7 @@ from textual.widgets import Input
 from rig.campaign import machine as campaign
 from rig.campaign.machine import BEFORE_RELEASE, Flow, Stage
 from rig.errors import RigError
+from rig.reasons import rig_error
 from rig.text_rows import read_rows
 from rig.tui import commands
 from rig.tui.actions import BY_NAME, PAGES
@@ -46,10 +47,6 @@ _SAVED_S = 0.1  # processor time that a fall may use beyond that
 _PAGE_OF = {stage: page for page, _, stages, _ in PAGES for stage in stages.split()}
 _HEIGHTS = [(0, "-low"), (30, "-high")]
 """Classes of a screen by its least number of lines."""
-_WATCHING = "this screen only watches\npress c to take control when it is free"
-_NOT_MEANT = (
-    "not armed: Enter came too soon after another key\nwait half a second, then press Enter once"
-)
 
 
 def _themes() -> Iterator[Theme]:
@@ -357,7 +354,7 @@ class RigApp(App[None], inherit_bindings=False):
         elif self._stillness.meant(self._face, at_s):
             self.driver.take(campaign.GoOn(self.model.next_job, self.model.settle_s))
         else:
-            self.driver.take(campaign.Notice(_NOT_MEANT))
+            self.driver.take(campaign.Notice(rig_error("enter_too_soon").two_lines))
 
     def action_do(self, name: str) -> None:
         """Do an action of the table, if it is possible now."""
@@ -365,7 +362,8 @@ class RigApp(App[None], inherit_bindings=False):
         if self.model.allows(action):
             self.begin(commands.DO[name](self))
         elif action.driving and not self.client.driving and not self.options.offline:
-            self.driver.take(campaign.EffectFailure(self.model.flow.ticket, _WATCHING))
+            watching = rig_error("only_watching")
+            self.driver.take(campaign.effect_failure(self.model.flow.ticket, watching))
 
     def action_choose(self, at: int) -> None:
         """Select a row of the home page."""

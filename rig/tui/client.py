@@ -170,7 +170,7 @@ class ReconnectingClient:
             try:
                 await self._once()
             except RigError as error:
-                self.silence = f"{error.message}\n{error.hint}"
+                self.silence = error.two_lines
             self.changed = True
             await asyncio.sleep(_AGAIN_S)
 
@@ -198,7 +198,7 @@ class ReconnectingClient:
             reached = asyncio.get_running_loop().create_task(self._connected())
             while not client.lost.is_set():
                 await self._beat(client)
-            self.silence = "it has ended\nan armed board has switched itself off"
+            self.silence = rig_error("daemon_ended").two_lines
         finally:
             self._hangs, self.disk_s = False, 0.0
             if reached is not None:
@@ -219,11 +219,8 @@ class ReconnectingClient:
                 raise
             if not answer.done():
                 self._hangs = self.changed = True
-                self.silence = (
-                    f"no answer for {monotonic() - begun:.0f} s\n"
-                    "an armed board has switched itself off and keeps a drop that fell; "
-                    f"if this stays: kill -9 {client.line.daemon['pid']}"
-                )
+                values = {"waited_s": monotonic() - begun, "pid": client.line.daemon["pid"]}
+                self.silence = rig_error("daemon_hangs", **values).two_lines
         if answer.exception() is None:
             self.changed |= self._hangs or self.disk_s > 0.0
             self._hangs, self.silence = False, ""

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from rig.analysis.result import GOOD
 from rig.campaign.machine import Again, GoOn, Note, Notice, Reject, Restore, Stage, StopRequest, Try
-from rig.reasons import notes_in
+from rig.reasons import notes_in, rig_error
 from rig.text_rows import read_rows
 from rig.tui.actions import ACTIONS, PAGES, help_text, shown_key
 from rig.tui.follow import open_live
@@ -40,14 +40,13 @@ _QUESTIONS = {name: texts for name, *texts in read_rows(__file__, "questions.txt
 REASONS = [reason for (reason,) in read_rows(__file__, "rejections.txt")]
 """Frequent reasons to reject a drop within its limits; the operator may type another."""
 _FLASH = "flash", "--board"
-_ONLY_ENTER = "only the Enter key arms the release\npress it half a second after any other key"
 
 
 def _go_on(app: RigApp) -> Work:
     """Take the next step of the flow, but never arm: see `rig.tui.app.RigApp._arm`."""
     stage = app.model.flow.stage
     if stage is Stage.PREPARE and app.model.page == "run":
-        app.driver.take(Notice(_ONLY_ENTER))
+        app.driver.take(Notice(rig_error("only_enter_arms").two_lines))
     elif stage is Stage.PREPARE:
         app.turn("run")
     elif stage is not Stage.PROTOCOL:
@@ -270,7 +269,7 @@ def _repeat(app: RigApp) -> None:
 def _unblind(app: RigApp) -> None:
     """Ask, then unblind the session."""
     if not app.model.blind:
-        app.driver.take(Notice("this session is not blind\nwrite blind: true in its protocol"))
+        app.driver.take(Notice(rig_error("not_blind").two_lines))
         return
     _confirm(app, "unblind", lambda: app.client.connection.call("unblind"))
 

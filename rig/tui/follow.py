@@ -13,6 +13,7 @@ from rig.campaign.machine import BEFORE_RELEASE, Event, Stage
 from rig.campaign.plan import job_to_judge
 from rig.campaign.voids import Voids, voids_of
 from rig.errors import RigError
+from rig.reasons import rig_error
 from rig.records import Job
 from rig.tui.client import ReconnectingClient
 from rig.tui.indicators import Indicators
@@ -22,16 +23,6 @@ from rig.tui.state import DaemonState, state_of
 if TYPE_CHECKING:
     from rig.results.live import LiveAnalysis, SessionView
 
-_UNHEARD = (
-    "the daemon was lost before the release: nothing fell\n"
-    "the board switches itself off; arm again when the daemon is back"
-)
-_UNSEEN = (
-    "the daemon was lost during the fall\n"
-    "daemon or board keeps the drop; it is analysed when the daemon is back"
-)
-_UNPLUGGED = "the port was lost before the release: nothing fell\narm again when it is back"
-_TAKEN = "another client took control of the rig\npress c to take it when it is free"
 _CLOCK_S = 3.0
 """Time between readings of the file, as clock samples also arrive between drops, s."""
 
@@ -85,7 +76,8 @@ class Follower:
         state = self._model.state = client.state
         self._look_at_gates(state)
         if not client.up:
-            yield campaign.Lost(_UNHEARD if stage in BEFORE_RELEASE else _UNSEEN)
+            code = "lost_before_release" if stage in BEFORE_RELEASE else "lost_in_fall"
+            yield campaign.Lost(rig_error(code).two_lines)
             return
         yield from _back(client, state)
         yield from _broken(stage, state)
@@ -96,7 +88,7 @@ class Follower:
             self._forget()
             yield campaign.SessionClose()
         if not client.driving and stage not in {Stage.LIVE, Stage.JUDGING}:
-            yield campaign.Lost(_TAKEN)
+            yield campaign.Lost(rig_error("control_taken").two_lines)
         missed = job_to_judge(state.runs)
         if missed and client.driving:
             yield campaign.Found(missed)
@@ -159,7 +151,7 @@ class Follower:
         try:
             await self.read()
         except RigError as error:
-            self._model.unreadable = f"{error.message}\n{error.hint}"
+            self._model.unreadable = error.two_lines
 
     async def _fit_jointly(self, live: LiveAnalysis, view: SessionView) -> None:
         try:
@@ -188,7 +180,7 @@ def _back(client: ReconnectingClient, state: DaemonState) -> Iterator[Event]:
 def _broken(stage: Stage, state: DaemonState) -> Iterator[Event]:
     """Yield the event that an armed or arming drop has failed, as no answer will follow."""
     if stage in BEFORE_RELEASE and state.link == "down":
-        yield campaign.Lost(_UNPLUGGED)
+        yield campaign.Lost(rig_error("unplugged_before_release").two_lines)
     drop = state.section("drop")
     if stage is Stage.COUNTDOWN and drop.get("state") == "interrupted":
         line = state.line(drop["run"])

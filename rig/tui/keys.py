@@ -10,11 +10,11 @@ from textual.keys import Keys, key_to_character
 
 from rig.errors import InputError
 from rig.files import read_input
+from rig.reasons import errors_become, rig_error
 from rig.tui.actions import ACTIONS, BY_NAME
 
 ALWAYS = {"stop": "f9", "go_on": "enter"}
 """Keys that an action keeps in addition to the operator's own."""
-_HOW = 'write one line for each action, such as reject = "r"'
 _HELD = {"ctrl", "shift", "alt"}
 
 
@@ -35,18 +35,16 @@ def read_keys(path: Path | None = None) -> dict[str, str]:
     place = path or Path(base) / "chainrig" / "keys.toml"
     if path is None and not place.is_file():
         return {action.name: action.keys for action in ACTIONS}
-    try:
+    with errors_become("keys_unreadable", OSError, ValueError, path=place):
         text = read_input(place).decode()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{place}: {reason}", _HOW) from None
     try:
         table = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         reason, _, at = str(error).partition(" (at ")
         *before, last = text.split("\n")
         line, column = re.findall(r"\d+", at) or (len(before) + 1, len(last) + 1)
-        raise InputError(f"{place}:{line}:{column}: {reason}", _HOW) from None
+        where = f"{place}:{line}:{column}"
+        raise rig_error("keys_unreadable", path=where, text=reason) from None
     lines = {line.partition("=")[0].strip(): n for n, line in enumerate(text.splitlines(), start=1)}
     return merge_keys(table, str(place), lines)
 

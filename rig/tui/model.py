@@ -10,7 +10,7 @@ from rig.campaign import plan
 from rig.campaign.machine import BEFORE_RELEASE, Flow, Stage
 from rig.campaign.voids import Voids
 from rig.protocol.protocol import Protocol, Run
-from rig.reasons import Reason
+from rig.reasons import Reason, rig_error
 from rig.recorder.run_lines import RunLine
 from rig.records import Job
 from rig.tui.actions import NEEDS_RIG, Action
@@ -207,11 +207,7 @@ def alarm(model: Model) -> str:
         parts = [hint, "reconnecting", *[_ALONE] * begun]
         return f"no daemon: {silence or 'connecting'}\n{'; '.join(filter(None, parts))}"
     if model.client.disk_s > SLOW_DISK_S:
-        return (
-            f"the disk has not finished a write for {model.client.disk_s:.1f} s\n"
-            "nothing is lost, and an armed board has switched itself off; check whether the disk "
-            "is full, asleep or on a network, and whether another program uses the file"
-        )
+        return rig_error("disk_unfinished", waited_s=model.client.disk_s).two_lines
     link, error = model.state.section("link"), model.state.section("error")
     if link.get("state") == "down" or (link.get("state") == "opening" and error):
         why, wait = link.get("error") or error, link.get("retry_s")

@@ -2,19 +2,16 @@
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from fractions import Fraction
 
 import numpy as np
 
-from rig.analysis.result import DropResult
 from rig.analysis.trajectory import Trajectory
 from rig.arrays import Array
 from rig.errors import DomainError
 from rig.estimate.curves import model_fall
 from rig.protocol.contact import of_run
 from rig.protocol.protocol import Protocol, RodChain, Run, Side
-from rig.records import Drop
-from rig.report.falls import passages
+from rig.report.falls import TimedDrop, passages
 
 _POINTS = 120  # points of a curve: two in each column of a wide terminal
 
@@ -80,7 +77,7 @@ class ChainFall:
 
 
 def motions(
-    protocol: Protocol, run: Run, recorded: tuple[Drop, float | Fraction, DropResult] | None = None
+    protocol: Protocol, run: Run, recorded: TimedDrop | None = None
 ) -> tuple[ChainFall, ...]:
     """Return the falls of a run's chains, measured and by the model.
 
@@ -104,7 +101,7 @@ def motions(
             model = replace(model, height=model.height - rods.chain.length)
         times, heights, delay, end = np.empty(0), np.empty(0), 0.0, 0.0
         if recorded is not None:
-            seen = passages(protocol, *recorded, role)
+            seen = passages(protocol, recorded, role)
             times, heights = seen.time, seen.height - rods.chain.length
         if model is not None and times.size:
             delay = float(np.median(times - model.times(heights)))

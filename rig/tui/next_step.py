@@ -28,18 +28,13 @@ def hand(model: Model) -> str:
     return _HANDS.get(model.words.reset.split()[0], "Set up")
 
 
-def at_rest(model: Model) -> str:
-    """Return how chains or objects wait, in the scene's words."""
-    return "hang still" if model.words.part == "rod" else "come to rest"
-
-
 def next_step(model: Model) -> NextStep:
     """Return the next step for the present stage and page."""
     step = _STEPS[_situation(model)]
     text = step.text.format(
         left_s=max(0.0, model.flow.left_s),
         edges=len(model.state.edges),
-        rest=at_rest(model),
+        rest="hang still" if model.words.part == "rod" else "come to rest",
         beams=_blocked_beams(model),
         hand=hand(model),
         setup=_setup(model),

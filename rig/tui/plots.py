@@ -38,8 +38,8 @@ def fall_pictures(falls: tuple[ChainFall, ...]) -> list[Picture]:
 
 def drop_pictures(view: SessionView, job: Job) -> list[Picture]:
     """Return the report's figures of a drop; empty if it does not count."""
-    drop, hz = view.drops[job], view.scales[job].hz
-    return pictures_of(*fall_figures(view.protocol, drop, hz, view.results[job]))
+    timed = view.drops[job], view.scales[job].hz, view.results[job]
+    return pictures_of(*fall_figures(view.protocol, timed))
 
 
 def session_pictures(view: SessionView) -> Iterator[tuple[Picture, str]]:

@@ -12,7 +12,6 @@ from typing import NamedTuple
 from rig.errors import RigError
 from rig.files import file_stamp
 from rig.flash.drive import waiting_drives
-from rig.protocol.plan import runs
 from rig.ready import ready_protocols
 from rig.results.whole import protocol_of
 from rig.session.store import Session
@@ -107,7 +106,7 @@ def _look(path: Path, _: object) -> SessionEntry:
         with Session.open(path, readonly=True) as session:
             protocol, source = protocol_of(session), Path(session.protocol_source).name
             recorded = {entry[:2] for entry in session.states() if entry.state == "recorded"}
-            counts = len(recorded), len({run for run, _ in recorded}), len(runs(protocol))
+            counts = len(recorded), len({run for run, _ in recorded}), len(protocol.runs())
             created = session.meta["created"]
             return SessionEntry(path, protocol.title, created, *counts, source, session.simulated)
     except RigError as error:

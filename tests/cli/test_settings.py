@@ -3,7 +3,6 @@
 import pytest
 
 from rig.analysis.owners import suffixes
-from rig.protocol.plan import runs
 from rig.protocol.reader import parse, read
 from tests.analysis.kept_results import FOLDER
 from tests.cli.lab import PROTOCOLS, record, short
@@ -76,15 +75,15 @@ def test_unknowns_are_shared_by_settings_that_state_the_same():
     words = "{drop: [180 mm, 228.5 mm], surface.friction: [0.1, 0.2]}"
     protocol = parse(vary(words, short("40 deg", 1), "drop", "friction"))
     first = [{}, {}, *[{"start": " (drop 228.5 mm, surface.friction 0.1)"}] * 2]
-    assert [suffixes(protocol, run) for run in runs(protocol)] == first
+    assert [suffixes(protocol, run) for run in protocol.runs()] == first
     ball = (PROTOCOLS / "falling-ball.yaml").read_text("utf-8")
     text = vary("{drag.terminal_speed: [60 m/s, 50 m/s]}", ball, "drag")
     protocol = parse(f"{text}drag: {{}}\n")
-    assert {owner for run in runs(protocol) for owner in suffixes(protocol, run)} == {"air"}
-    assert suffixes(read(PROTOCOLS / "falling-ball.yaml"), runs(protocol)[0]) == {}
+    assert {owner for run in protocol.runs() for owner in suffixes(protocol, run)} == {"air"}
+    assert suffixes(read(PROTOCOLS / "falling-ball.yaml"), protocol.runs()[0]) == {}
 
 
 def test_chains_that_any_setting_makes_unlike_are_told_apart():
     text = short().replace("length: 1165 mm, ", "").replace("like: A", "like: A, length: 1165 mm")
     protocol = parse(vary("{chains.A.length: [1165 mm, 1150 mm]}", text))
-    assert {protocol.condition(run).impact_chain for run in runs(protocol)} == {"A", "B"}
+    assert {protocol.condition(run).impact_chain for run in protocol.runs()} == {"A", "B"}

@@ -8,7 +8,7 @@ from bench.process_fixture import FENCE
 from rig.daemon.connecting import connect
 from rig.daemon.service import METHODS
 from rig.daemon.worker import Worker
-from rig.errors import DeviceError, SessionError, StoppedError
+from rig.errors import InputError, SessionError, StoppedError
 from rig.reasons import plain_reason, rig_error
 from rig.recorder.interrupts import Interrupts
 from rig.recorder.published import PublishedState
@@ -116,7 +116,7 @@ def test_a_client_finds_in_the_file_what_it_has_asked_for(tmp_path, monkeypatch)
     client.fire(client.arm(1, 2))
     assert client.collect(1, 2) == session.drop(1, 2) == next(session.drops())
     client.log_state(1, 2, RunState.VOID, (plain_reason("skew"),))
-    refused(DeviceError, "there is no record of run 2, attempt 1", client.collect, 2, 1)
+    refused(InputError, "there is no record of run 2, attempt 1", client.collect, 2, 1)
     course = ["armed", "interrupted", "armed", "fired", "recorded", "void"]
     assert [entry.state for entry in session.states()] == course
     assert session.states()[-1].reasons == (plain_reason("skew"),)

@@ -5,7 +5,6 @@ from functools import cache
 from rig.analysis.session import Analysis
 from rig.analysis.unknowns import SharedUnknowns
 from rig.estimate.quadratic_forms import QuadraticForm, quadratic_form
-from rig.protocol.plan import runs
 from sim.dials import Dials
 from tests.analysis.drops import SCENES
 from tests.analysis.sessions import analysis as analyzed
@@ -20,7 +19,7 @@ def analysis(
     inclines: tuple[float, ...], each: int = 2, seed: int = 1, dials: Dials = DIALS
 ) -> Analysis:
     """So many drops at each of these inclines, half of them with either chain."""
-    planned = runs(SCENES["uniform"])
+    planned = SCENES["uniform"].runs()
     numbers = tuple(
         run.number
         for incline in inclines
@@ -32,7 +31,7 @@ def analysis(
 @cache
 def forms(inclines: tuple[float, ...], each: int = 2, seed: int = 1) -> tuple[QuadraticForm, ...]:
     found = analysis(inclines, each, seed)
-    by_number = {run.number: run for run in runs(SCENES["uniform"])}
+    by_number = {run.number: run for run in SCENES["uniform"].runs()}
     shared = SharedUnknowns(drop.model for drop in found.adjusted.values())
     return tuple(
         quadratic_form(by_number[run], drop, shared) for (run, _), drop in found.adjusted.items()

@@ -13,7 +13,6 @@ from rig.estimate.posterior import Posterior, posterior
 from rig.estimate.quadratic_forms import merge_like
 from rig.estimate.rods import _gains
 from rig.estimate.session import estimate
-from rig.protocol.plan import runs
 from rig.units import Quantity
 from tests.analysis.drops import FENCE, UNIFORM, case
 from tests.analysis.sessions import MILD, cases
@@ -126,7 +125,7 @@ def test_good_drops_that_no_motion_fits_are_left_out_and_named():
 def dropped(protocol, inclines, each):
     """Drops of a scene of its own, analysed: so many at each incline, with A, B, B, A."""
     at = {
-        incline: [run for run in runs(protocol) if run.incline_deg == incline]
+        incline: [run for run in protocol.runs() if run.incline_deg == incline]
         for incline in inclines
     }
     numbers = [run.number for planned in at.values() for run in planned[:each]]

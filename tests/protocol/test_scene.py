@@ -17,7 +17,6 @@ from rig.model.fall import free_leg
 from rig.protocol import measurable
 from rig.protocol.describe import describe
 from rig.protocol.keys import MOST_RODS, SECTIONS
-from rig.protocol.plan import runs
 from rig.protocol.protocol import Priors, Run
 from rig.protocol.reader import parse, read
 from rig.protocol.site import gravity_at
@@ -34,7 +33,7 @@ TWO = protocol_text("two-chains")
 def planned(**changes):
     protocol = parse(TWO)
     plan = dataclasses.replace(protocol.plan, **changes)
-    return runs(dataclasses.replace(protocol, plan=plan))
+    return dataclasses.replace(protocol, plan=plan).runs()
 
 
 @cases
@@ -64,9 +63,9 @@ def test_the_shuffle_is_the_same_for_ever():
 
 def test_scenes_with_one_chain():
     one = TWO.replace("  B: {like: A}\n", "")
-    assert runs(parse(one)) == (Run(1, 0.0, "A", None),)
+    assert parse(one).runs() == (Run(1, 0.0, "A", None),)
     falling = one.replace("surface: {restitution: 0.5}\n", "")
-    assert runs(parse(falling)) == (Run(1, 0.0, None, "A"),)
+    assert parse(falling).runs() == (Run(1, 0.0, None, "A"),)
 
 
 @cases
@@ -198,9 +197,9 @@ def test_every_setting_is_a_scene_of_its_own_with_its_own_runs():
     scenes = protocol.settings
     heights = [Quantity(0.18, 1e-3), Quantity(0.2285, 2e-3)]
     assert [scene.drop for scene in scenes.values()] == heights
-    planned = runs(protocol)
+    planned = protocol.runs()
     assert [run.setting for run in planned[::4]] == [*scenes] * 2
-    assert len(planned) == 2 * len(runs(parse(GOOD)))
+    assert len(planned) == 2 * len(parse(GOOD).runs())
     assert all(protocol.of(run) == scenes[run.setting] for run in planned)
     assert protocol.with_gates(()).of(planned[-1]).gates.gates == ()
 

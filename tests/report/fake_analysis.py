@@ -8,7 +8,6 @@ from rig.analysis.result import DropResult, Measured
 from rig.analysis.session import Analysis
 from rig.analysis.summary import Incline, summarize
 from rig.predictions import predictions
-from rig.protocol.plan import runs
 from rig.protocol.protocol import Condition, Run
 from rig.units import Quantity
 from tests.analysis.drops import UNIFORM, made_up
@@ -31,7 +30,7 @@ def two_chains() -> Analysis:
     rng = random.Random(1)
     plan = replace(UNIFORM.plan, inclines=tuple(MODEL))
     drops = []
-    for run in runs(replace(UNIFORM, plan=plan)):
+    for run in replace(UNIFORM, plan=plan).runs():
         separation, speed = MODEL[run.incline_deg]
         skew = rng.gauss(0.0008, 0.002)
         dz = separation + 0.0008 + rng.gauss(0, 0.0022)

@@ -159,7 +159,7 @@ AIR = reader.parse(f"{UNIFORM.text}drag: {{terminal_speed: 15 m/s}}\n")
 def test_points_of_a_perfect_fall_lie_on_its_line(name):
     """A glider's card is in a beam for a third of a second, and speeds up meanwhile."""
     drop = case(reader.read(PROTOCOLS / f"{name}.yaml"), Dials.quiet(), run=1)
-    (figure,) = fall_figures(drop.protocol, drop.drop, drop.scale.hz, drop.analyze())
+    (figure,) = fall_figures(drop.protocol, (drop.drop, drop.scale.hz, drop.analyze()))
     panels = [panel for panel in figure.panels if panel.y.label.startswith("residual")]
     assert [len(panel.series[-1].y) >= 4 for panel in panels] == [True, True]
     assert all(abs(ratio) < 0.2 for panel in panels for ratio in panel.series[-1].y)
@@ -169,7 +169,7 @@ def test_points_of_a_perfect_fall_lie_on_its_line(name):
 def test_points_of_a_perfect_separation_lie_on_the_models_line(protocol, run):
     """The line falls in the stated air, and heights count from where the top rod touches."""
     drop = case(protocol, Dials.quiet(), run=run)
-    figure, speeds = fall_figures(drop.protocol, drop.drop, drop.scale.hz, drop.analyze())
+    figure, speeds = fall_figures(drop.protocol, (drop.drop, drop.scale.hz, drop.analyze()))
     residuals = figure.panels[-1].series[-1].y
     assert len(residuals) > 100
     assert max(map(abs, residuals)) < 0.2

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 from rig.analysis.result import Measured
 from rig.protocol import reader
-from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Gate, Run
 from rig.reasons import OPERATOR, SENTENCE, WORDINGS, Severity, make_reason, plain_reason, remedies
 from rig.records import Drop, Edge
@@ -73,7 +72,7 @@ def test_a_finding_of_nothing_says_so():
 
 def test_departures_from_the_plan_are_named():
     protocol = reader.read(PROTOCOLS / "single-chain.yaml")
-    planned = planned_runs(protocol)
+    planned = protocol.runs()
     made = [made_up(run) for run in planned]
     whole = fake_analysis.analysis(made, [])
     assert deviations(protocol, whole, [entry(run.number) for run in planned]) == [NONE]
@@ -112,14 +111,14 @@ def test_a_timeline_has_a_lane_for_each_gate_and_a_bar_for_each_shadow():
     assert [gate.channel for gate in shared.gates] == [0, 1, 8]  # from the top, impact first
     # 1280 steps for 500 ms: from 100 to 200 and what is not over; blocked from the start.
     bars = "M0 15m256 0h256m768 0h1M0 45m0 0h640M0 75m1024 0h256"
-    assert timeline(shared, drop, 1000, result)[1:] == (bars, "M1280 15m0-10v20")
-    assert timeline(shared, replace(drop, edges=()), 1000, result)[1:] == ("", "")
+    assert timeline(shared, (drop, 1000, result))[1:] == (bars, "M1280 15m0-10v20")
+    assert timeline(shared, (replace(drop, edges=()), 1000, result))[1:] == ("", "")
 
 
 def test_imported_edges_begin_where_they_begin():
     late = Drop(1, 1, 1000, tuple(edge._replace(tick=edge.tick + 10_000) for edge in EDGES))
     drop = late, 1000, void(1, 1)
-    drawn = timeline(lanes(GATES, [drop]), *drop)
+    drawn = timeline(lanes(GATES, [drop]), drop)
     assert drawn.bars.startswith("M0 15m0 0h320m")  # 100 of 400 ms
     assert not drawn.odd  # nothing was fitted, so nothing is odd
 

@@ -11,7 +11,6 @@ from bench.studies.falls import Asked, falls, simulation
 from bench.studies.time_scales import time_scale
 from rig.analysis.session import analyze
 from rig.protocol.keys import SECTIONS
-from rig.protocol.plan import runs as planned
 from rig.protocol.reader import parse
 from sim.dials import Dials
 from tests.analysis.drops import case
@@ -42,7 +41,7 @@ def test_a_scene_of_which_edges_say_little_is_analysed_as_far_as_they_do(seed, t
     """No edge but of rods that may have struck; one gate that sees a rod after any strike."""
     odd = scene(seed)
     (path := tmp_path / "scene.yaml").write_text(odd.text, encoding="utf-8")
-    runs = [run.number for run in planned(odd.protocol)]
+    runs = [run.number for run in odd.protocol.runs()]
     drops = [*falls([Asked(simulation(path, url=odd.port), [seed], [runs])])]
     results = analyze(odd.protocol, [fall.drop for fall in drops], lambda _: time_scale(seed)).runs
     for result, fall in zip(results, drops, strict=True):

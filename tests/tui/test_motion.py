@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rig.protocol import reader
-from rig.protocol.plan import runs
 from rig.ready import ready_protocol
 from rig.records import Drop, Edge
 from rig.report.figure import Panel, PlotAxis, Trace
@@ -40,7 +39,7 @@ def test_points_lie_on_the_models_curve():
 
 def test_a_ball_is_shown_until_it_has_passed_its_last_gate():
     ball = reader.read(ready_protocol("falling-ball"))
-    (fall,) = motions(ball, runs(ball)[0])
+    (fall,) = motions(ball, ball.runs()[0])
     assert fall.end_s == pytest.approx((2 * 0.8 / 9.81) ** 0.5, abs=0.01)
 
 

@@ -8,7 +8,6 @@ from textual.content import Content
 from rig.campaign.machine import Stage
 from rig.predictions import notes
 from rig.protocol.describe import describe
-from rig.protocol.plan import runs
 from rig.protocol.protocol import Protocol
 from rig.text_rows import read_paragraphs
 from rig.tui.beginnings import Beginning
@@ -61,7 +60,7 @@ def _menu(desk: Desk) -> Content:
 
 def _picture(protocol: Protocol) -> Drawing | None:
     """Return a drawing of the predicted fall, part of the way down."""
-    run = runs(protocol)[0]
+    run = protocol.runs()[0]
     falls = motions(protocol, run)
     end = max((fall.end_s for fall in falls), default=0.0)
     return drawing(protocol, run, falls, (), _FALLEN * end) if falls else None
