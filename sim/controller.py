@@ -184,7 +184,7 @@ class Microcontroller:
         order = self.order
         if self.drop is not None:
             order = self.drop.order
-        events = len(self.drop) if self.drop is not None else 0
+        events = len(self.drop or ())
         return wire.State(self.phase, self.gates, order.label if order else 0, events)
 
     def _arm(self, order: wire.Arm) -> wire.DeviceMessage:

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from rig.errors import InputError
 from rig.link.messages import pack_label, unpack_label
@@ -130,9 +131,8 @@ class ResolvedLab(ChainLab):
         return {side: self._hang(side, hung) for side in hung.bodies}
 
     def _nominal(self, spec: RodChain) -> Rods:
-        diameters = np.array(spec.diameters)
+        diameters, masses = np.array(spec.diameters), np.array(spec.chain.masses)
         length = spec.rod_length or ROD_LENGTH
-        masses = np.array(spec.chain.masses)
         if not spec.weighed:
             masses = self.dials.density * math.pi / 4.0 * diameters**2 * length
         zero = np.zeros(diameters.size)
@@ -224,8 +224,12 @@ class ResolvedLab(ChainLab):
 
 
 def top_at(fall: Fall, times_s: Any) -> Any:
-    """Heights of the top rod's middle at times since its release, m."""
-    return np.interp(times_s, fall.times, fall.heights[:, -1])
+    """Heights of the top rod's middle at times since its release, m.
+
+    A short free chain may be let fall beside a long one that strikes after the short one's end:
+    it falls on as it fell last.
+    """
+    return CubicSpline(fall.times, fall.heights[:, -1])(times_s)
 
 
 def at_level(struck: Fall, gravity: float) -> tuple[float, float]:

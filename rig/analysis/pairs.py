@@ -17,7 +17,6 @@ from rig.analysis.result import DropResult, Measured, good_runs
 from rig.arrays import Array
 from rig.measurands import of_kind
 from rig.plain_data import Record
-from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Protocol
 
 _CHAINS_OWN = ("spacing", "width")  # common lines of a budget that differ between chains
@@ -69,7 +68,7 @@ def effects(protocol: Protocol, results: Iterable[DropResult]) -> tuple[Effects,
     order = [first, second, second, first]
     good = {result.run: result for result in good_runs(results)}
     signs = np.array([1.0, -1.0, -1.0, 1.0])  # first chain less second, for each run of a block
-    planned, every = planned_runs(protocol), []
+    planned, every = protocol.runs(), []
     for incline, setting in product(sorted({*protocol.plan.inclines}), protocol.settings):
         runs = [run for run in planned if (run.incline_deg, run.setting) == (incline, setting)]
         fours = zip(*(runs[place::4] for place in range(4)), strict=False)

@@ -23,7 +23,6 @@ from rig.analysis.verdict import nearly_in_time, release_reasons, verdict_of
 from rig.clock.calibration import TimeScale
 from rig.plain_data import Record
 from rig.protocol.measurable import check_measurable
-from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Protocol, Run
 from rig.reasons import Reason, make_reason, rig_error
 from rig.records import Drop, Job
@@ -202,7 +201,7 @@ def _summarize(task: tuple[DropCase, DropSummary | None]) -> DropSummary:
 @lru_cache(maxsize=8)
 def plan_of(protocol: Protocol) -> Mapping[int, Run]:
     """Return the planned runs by number."""
-    return {run.number: run for run in planned_runs(protocol)}
+    return {run.number: run for run in protocol.runs()}
 
 
 def drop_case(protocol: Protocol, drop: Drop, scale: TimeScale) -> DropCase:

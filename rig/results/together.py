@@ -18,7 +18,6 @@ from rig.analysis.session import Analysis, Progress, SessionDrops, fit_sessions
 from rig.analysis.summary import Incline, summarize
 from rig.measurands import averaged
 from rig.plain_data import Record, attributes, plain
-from rig.protocol.plan import runs as planned_runs
 from rig.protocol.protocol import Condition, Protocol
 from rig.protocol.variants import SCENE
 from rig.reasons import rig_error
@@ -206,7 +205,7 @@ def results_together(
     for name, session in zip(names, files, strict=True):
         check_open(session)
         own, protocol = results(session, progress, fresh=fresh), protocol_of(session)
-        _check_whole(session, own.analysis, len(planned_runs(protocol)), unfinished=unfinished)
+        _check_whole(session, own.analysis, len(protocol.runs()), unfinished=unfinished)
         analysis = complete_analysis(session, own, progress)
         boards = [str(identity.get("unique_id", "")) for _, identity in session.identities()]
         parts.append(SessionPart(name, protocol, own, analysis, *boards[-1:]))

@@ -16,7 +16,6 @@ from rig.analysis.drop_model import DropModel
 from rig.analysis.dual import Dual
 from rig.analysis.gravity import free_gravity
 from rig.analysis.quantities import AdjustedDrop
-from rig.protocol.plan import runs as planned
 from rig.protocol.protocol import Contact
 from rig.protocol.reader import parse
 from rig.units import Quantity
@@ -105,7 +104,7 @@ def test_gravity_by_a_graded_chain_is_right_where_air_makes_its_strings_taut():
     ready, seeds = PROTOCOLS / "graded-chain.yaml", [1]
     url = f"sim://?dynamics=resolved&drag=0.025&protocol={ready}"
     graded, off = SCENES["graded"], []
-    runs = {run.number: run for run in planned(graded)}
+    runs = {run.number: run for run in graded.runs()}
     for fall in falls([Asked(url, seeds, [[1]] * len(seeds))]):
         _, fit = DropCase(graded, runs[1], fall.drop, time_scale(fall.seed)).read()
         gravity = free_gravity(fit)

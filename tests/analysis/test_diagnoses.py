@@ -11,7 +11,6 @@ from rig.analysis.faults import Premise, Suspects, alike, faults, rods_of, turn
 from rig.analysis.result import GOOD
 from rig.clock.calibration import TimeScale
 from rig.estimate.curves import model_fall
-from rig.protocol.plan import runs
 from rig.protocol.protocol import Drag
 from rig.protocol.reader import parse
 from rig.records import Edge
@@ -157,7 +156,7 @@ def test_a_post_of_two_gates_may_stand_wrong_and_of_one_it_is_the_gate():
         few = UNIFORM.with_gates(gates)
         posts = [
             fault.values(0.01, 0.001)["side"]
-            for fault in faults(Premise(few, runs(few)[0], 1.0), Suspects())
+            for fault in faults(Premise(few, few.runs()[0], 1.0), Suspects())
             if fault.code == "post"
         ]
         assert sorted(posts) == ["free", "impact"][2 - count :]

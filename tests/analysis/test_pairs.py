@@ -8,7 +8,6 @@ import pytest
 from rig.analysis.pairs import effects
 from rig.analysis.result import DropResult, Measured
 from rig.link.messages import pack_label
-from rig.protocol.plan import runs
 from sim.lab import ChainLab
 from tests.analysis.drops import SINGLE, UNIFORM, made_up
 from tests.analysis.sessions import MILD, analysis, cases
@@ -21,7 +20,7 @@ def planned(value, u=1e-6, protocol=UNIFORM) -> list[DropResult]:
     """Every planned run accepted, with a value that may depend on its number and chain."""
     return [
         made_up(run, **{name: Measured(value(run.number, run.impact), u) for name in NAMES})
-        for run in runs(protocol)
+        for run in protocol.runs()
     ]
 
 

@@ -10,14 +10,13 @@ from bench.studies.falls import Asked, falls
 from bench.studies.time_scales import time_scale
 from rig.analysis.components import Components
 from rig.analysis.drop import DropCase
-from rig.protocol.plan import runs as planned
 from tests.analysis.drops import PROTOCOLS, UNIFORM, codes
 
 pytestmark = pytest.mark.usefixtures("loops_compiled")
 
 SEEDS = (3, 4)
 HELD = "separation_m", "separation_strike_m", "speed_m_s", "release_skew_s"
-RUNS = {run.number: run for run in planned(UNIFORM)}
+RUNS = {run.number: run for run in UNIFORM.runs()}
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,6 @@ from rig.analysis.averages import combine, mean
 from rig.analysis.distributions import coverage_factor
 from rig.analysis.result import DropResult, Measured
 from rig.analysis.summary import summarize
-from rig.protocol.plan import runs
 from rig.units import Quantity
 from tests.analysis.drops import UNIFORM, made_up
 
@@ -49,7 +48,7 @@ def results(protocol, values: dict[float, list[float]], verdict="accepted") -> l
     """Made-up drops: Δz is the value, V fifty times it."""
     found = []
     for incline, numbers in values.items():
-        planned = [run for run in runs(protocol) if run.incline_deg == incline]
+        planned = [run for run in protocol.runs() if run.incline_deg == incline]
         for run, x in zip(planned, numbers, strict=False):
             both = {"separation_m": measured(x, 1e-4), "speed_m_s": measured(50 * x, 1e-2)}
             found.append(made_up(run, verdict, **both))

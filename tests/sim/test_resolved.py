@@ -228,6 +228,17 @@ def dropped(scene) -> tuple[ResolvedLab, list, list]:
     return lab, truths, edges
 
 
+def test_a_short_free_chain_falls_on_beside_a_long_one(tmp_path):
+    """It passes the contact level by more than a rod's length before the long one's end."""
+    chain = "{rods: 2, length: 20 mm, diameter: 12.7 mm, rod_length: 102 mm}"
+    (tmp_path / "short.yaml").write_text(SCENE.replace("{like: A}", chain))
+    truths: list = []
+    lab = ResolvedLab(reader.read(tmp_path / "short.yaml"), ResolvedDials.quiet(), 3, truths.append)
+    lab.drop(pack_label(1, 1))
+    fallen = 0.5 * GRAVITY * truths[0].fall_time_s ** 2
+    assert truths[0].separation_m == pytest.approx(0.62 - fallen, abs=1e-6)
+
+
 def test_truth_at_level_and_at_strike(dropped):
     _, truths, _ = dropped
     for truth in truths:
