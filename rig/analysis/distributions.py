@@ -7,7 +7,8 @@ predictions, checks and plans do not need it.
 from functools import lru_cache
 from typing import Any
 
-_ONCE_IN = 1e-3
+BY_CHANCE = 1e-3
+"""Probability below which something is not taken for chance."""
 
 
 def special() -> Any:
@@ -63,4 +64,4 @@ def most_by_chance(trials: int, share: float) -> int:
     share
         Probability that an edge is missed, independently: the number is binomial.
     """
-    return next(k for k in range(trials + 1) if special().bdtrc(k, trials, share) < _ONCE_IN)
+    return next(k for k in range(trials + 1) if special().bdtrc(k, trials, share) < BY_CHANCE)

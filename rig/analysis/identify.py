@@ -26,6 +26,7 @@ from rig.analysis.annealing import (
     count_matched,
 )
 from rig.analysis.chain_records import SIDES, ChainRecord
+from rig.analysis.distributions import BY_CHANCE
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY
 from rig.analysis.fit import Begun, DropFit, Fit, Matches, settle, simultaneous
@@ -38,7 +39,7 @@ from rig.vocabulary import ANY_SCENE, Vocabulary
 
 Reading = TypeVar("Reading", FallFit, Fit)
 
-LEAD = math.log(1000.0)
+LEAD = -math.log(BY_CHANCE)
 """Least log odds of a reading against the likeliest different one; below, a drop is ambiguous."""
 FAIR = 0.9
 """Matched share of the matchable edges above which a reading is good. With 0.95 fewer faults are

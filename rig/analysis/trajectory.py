@@ -6,13 +6,13 @@ in `rig.model.fall` and `rig.model.drag`. Parameters are release time, start hei
 falls of the same chain.
 """
 
-import math
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from rig.analysis.distributions import special
 from rig.analysis.free_flight import (
     fall_for,
     fall_slopes,
@@ -31,8 +31,6 @@ RELEASE, START, GRAVITY, DRAG = range(COMMON)
 """Columns of every trajectory's derivatives: release time, start height, acceleration, κ."""
 _STILL = float(np.finfo(float).eps)
 """Least share of its speed that a chain keeps at an impact: trial steps may give less than 0."""
-_NORMAL = math.sqrt(2.0 / math.pi)
-"""Slope at 0 of 2Φ(z) − 1, with Φ the normal distribution; tanh of it follows to 2 %."""
 _FAINT = 1e-3
 """Least probability of a leg that counts."""
 
@@ -155,7 +153,7 @@ class Trajectory:
             strikes, legs = self.time[..., 1:], self.time.shape[-1]
             rod = np.abs(times[..., None] - strikes[..., None, :]).argmin(axis=-1)  # the nearest
             off = speed * (np.take_along_axis(strikes, rod, -1) - times) / strike_u[rod]
-            other = 0.5 * (np.sign(off) - np.tanh(_NORMAL * off))
+            other = np.sign(off) * special().ndtr(-np.abs(off))
             near = np.nonzero(np.abs(other) > _FAINT)
             # Moving a strike in time shifts the later path by its gain of speed.
             gained = self.speed[..., 1:] - self.hits.arrival
