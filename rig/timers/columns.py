@@ -4,12 +4,11 @@ Facts are collected of each column (of its heading, its unit, its values), and t
 `columns.txt` that they fulfil says what it is, or what it may be.
 """
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 
@@ -59,6 +58,9 @@ class TimerColumn:
         calls the input; empty where it does not say.
     state
         ``blocked`` or ``clear`` where the heading says what all its times did to the beam.
+    packed
+        Of inputs that are packed in a number: its base, 0 where it begins with ``0x`` or ``0b``,
+        and which bit this input is.
     words
         What two unknown words mean, for which falls decide: the one that begins is ``high``.
     filled
@@ -74,8 +76,15 @@ class TimerColumn:
     clock: int = -1
     label: str = ""
     state: str = ""
+    packed: tuple[int, int] | None = None
     words: Mapping[str, str] = field(default_factory=dict)
     filled: float = 0.0
+
+    def text(self, cell: str) -> str:
+        """Return what a cell says of this column: of packed inputs, its bit."""
+        with suppress(ValueError):
+            return str(int(cell, self.packed[0]) >> self.packed[1] & 1) if self.packed else cell
+        return cell
 
     def __str__(self) -> str:
         meaning = roles()[self.role][0]
@@ -108,38 +117,56 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
     counts = Counter(itertools.chain(*facts.values()))
     heading = block.find_heading(width, facts)
-    for row in block.headings:
-        # What has half of a row's numbers is no heading, but a row of which nothing can be read.
-        count = sum(vocabulary.is_measured(row.cell(n)) for n in facts)
-        if row.line > heading.line and kinds_of(row.cell(0)) and 2 * count >= len(facts):
-            file.unread.append(row.line)
-            file.rows += 1
+    # What has half of a row's numbers is no heading, but a row of which nothing can be read.
+    broken = [
+        row.line
+        for row in block.headings
+        if row.line > heading.line and kinds_of(row.cell(0))
+        if 2 * sum(vocabulary.is_measured(row.cell(n)) for n in facts) >= len(facts)
+    ]
+    file.rows += len(broken)
+    file.unread += broken
     if 0 < len(heading.texts) < width and "counts" in facts.get(0, ()):
         heading = heading._replace(texts=["", *heading.texts])  # numbers of rows have no name
     file.facts |= {"beam"} if "any.beam" in counts else set()
-    shared = {f"table.{fact}" for fact in counts}
+    shared = {f"table.{fact}" for fact in counts} | facts_held({"rated": block.find_time_base()[1]})
     shared |= {f"columns.{min(len(facts), _MANY)}", f"states.{min(counts['all.state'], _MANY)}"}
-    shared |= facts_held({"rated": block.find_time_base()[1]})
     columns = [
-        _read_column(block, heading, n, facts[n] | shared, cells[n])
+        column
         for n in facts
         # Beside named columns a few cells are none.
         if not heading.texts or heading.cell(n) or 2 * len(cells[n]) > len(rows)
+        for column in _unpack(cells[n], n)
+        or [_read_column(block, heading, n, facts[n] | shared, cells[n])]
     ]
+    inputs = [column for column in columns if not heading.texts and column.role in SAMPLED]
+    for column, name in zip(inputs, block.find_inputs(len(inputs)), strict=False):
+        column.gate = column.name = name
+    _settle_roles(file, columns)
+    above, accepted = heading if heading.texts else rows[0], roles()["setting"][1]
     for column in columns:
         column.filled = len(cells[column.at]) / len(rows)
-    if not heading.texts:
-        inputs = [column for column in columns if column.role in SAMPLED]
-        for column, name in zip(inputs, block.find_inputs(len(inputs)), strict=False):
-            column.gate = column.name = name
-    _settle_roles(file, columns)
-    above = heading if heading.texts else rows[0]
-    for column in columns:
         if column.role == "setting":
-            accepted = roles()["setting"][1]
             file.problems.reject(*above.place(column.at), "heading", column.name, accepted)
     file.problems.raise_if_any()
     return columns
+
+
+def _unpack(cells: Sequence[str], at: int) -> list[TimerColumn]:
+    """Return a column for each input where all are packed in a number; none in other columns.
+
+    They are those bits of which one changes from row to row, each there and back.
+    """
+    for base in (0, 2, 16):
+        with suppress(ValueError):
+            changes = [a ^ b for a, b in itertools.pairwise(int(x, base) for x in cells) if a != b]
+            bits = Counter(x.bit_length() - 1 for x in changes if x & (x - 1) == 0)
+            if len(bits) > 1 and min(bits.values()) > 1 and bits.total() == len(changes):
+                return [
+                    TimerColumn(at, f"bit {n}", "level", gate=f"bit {n}", packed=(base, n))
+                    for n in sorted(bits)
+                ]
+    return []
 
 
 def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
@@ -147,7 +174,7 @@ def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
 
     Of roles that are possible each is taken once; falls decide which way is that of the file.
     """
-    there = {column.role for column in columns}
+    there = Counter(column.role for column in columns)
     meant = {
         "elapsed": "duration" if "time" in there else "time",
         # Beside states the same without a name; beside volts, volts that are 0 at first.
@@ -158,11 +185,10 @@ def _settle_roles(file: TimerFile, columns: Sequence[TimerColumn]) -> None:
     ways = [
         way
         for way in itertools.product(*readings if len(unclear) <= _MOST_OPEN else [[]])
-        if all(role == "other" or (role not in there and way.count(role) == 1) for role in way)
+        if max(((there + Counter(way))[role] for role in way if role != "other"), default=1) < 2
     ] or [("setting",) * len(unclear)]
-    file.ways = max(file.ways, file.separators * len(ways))
-    way = ways[file.way // file.separators % len(ways)]
-    for column, role in zip(unclear, way, strict=True):
+    file.facts |= facts_held({"guess": ways[1:]})
+    for column, role in zip(unclear, file.choose(*ways), strict=True):
         column.role = role
     for column in columns:
         column.role = meant.get(column.role, column.role)
@@ -176,7 +202,6 @@ def _read_column(
     name = heading.cell(n)
     above = [name, *(row.cell_over(n) for row in block.headings if row is not heading)]
     run, gate = (next(filter(None, [find_label(x, y) for x in above]), "") for y in ("run", "gate"))
-    column = TimerColumn(n, name or f"column {n + 1}", run=run)
     bare = vocabulary.without_accents(name)
     # Units stand in the heading, or in the row above the data.
     last = [row.cell(n) for row in block.headings[-1:] if name and row.line > heading.line]
@@ -184,27 +209,28 @@ def _read_column(
     unit = next((unit for unit in units if unit in {*POWERS, "v"}), units[0])
     is_numbers = form("row of numbers").fullmatch
     numbers = (row.cell(n) for row in block.headings if is_numbers(row.raw))
-    column.gate = gate or next(numbers, "")
+    gate = gate or next(numbers, "")
     roles_of_name = vocabulary.roles_in(bare.replace(find_label(bare, "run"), ""))
     named = {
         "time": unit in POWERS
         and vocabulary.normal(name).strip("()[] ") in vocabulary.words()[f"unit {unit}"],
-        "bare": not (roles_of_name - _NO_ROLES or unit or column.gate or column.run),
+        "bare": not (roles_of_name - _NO_ROLES or unit or gate or run),
         "named": name,
         "first": not n,
-        "labelled": column.gate,
-        "numbered": column.run,
+        "labelled": gate,
+        "numbered": run,
     }
     kind = "timed" if unit in POWERS else {"v": "volt", "": "unitless"}.get(unit, "strange")
     facts |= roles_of_name | facts_held(named) | {kind}
     rules = read_rows(__file__, "columns.txt", ":")
-    column.role = next(role for role, rule in rules if vocabulary.holds(rule, facts))
-    if column.role in {"time", "elapsed", "time|setting"}:
-        column.power = POWERS.get(unit, 0 if "all.stamp" in facts else None)
-        column.state = next((state for state in ("clear", "blocked") if state in facts), "")
-    if column.role == "edge" and {"pair", "all.state"} & facts == {"pair"}:
-        column.words = dict(zip(dict.fromkeys(cells), ("high", "low"), strict=True))
-    return column
+    role = next(role for role, rule in rules if vocabulary.holds(rule, facts))
+    is_time = "time" in role or role == "elapsed"
+    power = POWERS.get(unit, 0 if "all.stamp" in facts else None) if is_time else 0
+    state = next((x for x in ("clear", "blocked") if is_time and x in facts), "")
+    is_pair = role == "edge" and {"pair", "all.state"} & facts == {"pair"}
+    pair = zip(dict.fromkeys(cells), ("high", "low"), strict=False) if is_pair else ()
+    name = name or f"column {n + 1}"
+    return TimerColumn(n, name, role, power, gate, run, state=state, words=dict(pair))
 
 
 def _facts_of_values(texts: Sequence[str]) -> set[str]:
@@ -241,8 +267,9 @@ def pair_columns(columns: Sequence[TimerColumn]) -> dict[TimerColumn, list[Timer
     counts = [column for column in columns if column.role == "index"][:1] or [ROW_COUNT]
     times = [column for column in columns if column.role == "time"]
     # Of columns that say the same times in other units, the finest is kept.
-    finest = {_part_of(c): c.power for c in sorted(times, key=lambda c: c.power or 0)}
-    times = [c for c in times if c.power == finest[_part_of(c)]] or counts
+    coarse_first = sorted(times, key=lambda c: c.power or 0)
+    finest = {(c.gate, c.run, c.state): c.power for c in coarse_first}
+    times = [c for c in times if c.power == finest[c.gate, c.run, c.state]] or counts
     chosen = next((v for v in VALUES if any(c.role in v for c in columns)), ())
     nearest = {x: min(times, key=partial(_distance, x)) for x in columns if x.role in chosen}
     clocks = {clock: [x for x in nearest if nearest[x] is clock] for clock in times}
@@ -257,10 +284,6 @@ def pair_columns(columns: Sequence[TimerColumn]) -> dict[TimerColumn, list[Timer
             if chosen == SAMPLED and signal.label in {x.label for x in signals[: n - 1]}:
                 signal.label += f" ({n})"
     return {clock: signals for clock, signals in clocks.items() if signals}
-
-
-def _part_of(clock: TimerColumn) -> tuple[str, str, str]:
-    return clock.gate, clock.run, clock.state
 
 
 def _distance(value: TimerColumn, clock: TimerColumn) -> tuple[bool, bool, bool, int]:

@@ -4,8 +4,6 @@ They become levels with hysteresis around the middle between dark and bright; th
 straight line between two samples crosses that middle.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from rig.arrays import Array

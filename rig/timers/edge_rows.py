@@ -1,7 +1,5 @@
 """Drops as rows of the project's own format: ``run,channel,time_s,state``."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable
 from fractions import Fraction
@@ -46,7 +44,7 @@ def read_edges(path: str | Path) -> list[Drop]:
         if line.strip() and not is_remark(line)
     )
     next(rows, None)  # the header
-    runs, last = dict[int, list[tuple[int, int, bool]]](), dict[tuple[int, int], int]()
+    runs = dict[int, list[tuple[int, int, bool]]]()
     for row in rows:
         if len(row.texts) != len(HEADER):
             problems.add(row.line, 1, "", "wrong_width", values=len(row.texts))
@@ -62,9 +60,9 @@ def read_edges(path: str | Path) -> list[Drop]:
         run, channel, tick, state = values
         edges = runs.setdefault(run, [])
         first = edges[0][0] if edges else tick
-        begin, end = last.get((run, channel), first - LONGEST_DROP), first + LONGEST_DROP
+        same = (edge[0] for edge in reversed(edges) if edge[1] == channel)
+        begin, end = next(same, first - LONGEST_DROP), first + LONGEST_DROP
         if begin <= tick <= end:
-            last[run, channel] = tick
             edges.append((tick, channel, bool(state)))
         else:
             since, until = (seconds(bound, Fraction(TICK_HZ)) for bound in (begin, end))

@@ -4,13 +4,11 @@ Each way is compared with falls of the protocol; the best is taken with its evid
 decides is asked, and rows of which no edge is made are refused.
 """
 
-from __future__ import annotations
-
 import itertools
 import re
 from argparse import Namespace
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -35,6 +33,7 @@ _COARSE = 10**8
 """Picoseconds: times in whole tenths of milliseconds may be those of two falls by chance."""
 _FEWEST_SAME = 3
 """Edges at the same times: the first may be 0 in every run, and a second by chance."""
+_MOST_WAYS = 64
 _HEAD = 50
 """Lines above or at which the project's own header stands."""
 
@@ -106,9 +105,9 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
     """
     place = options.events
     if is_own(itertools.islice(read_lines(place), _HEAD)):
-        for name in "map", "map_file", "channel", "dark", "unit":
-            if getattr(options, name) is not None:
-                raise refusal(f"--{name.replace('_', '-')}", "own_format_stated")
+        for name in "map", "map-file", "channel", "dark", "unit":
+            if getattr(options, name.replace("-", "_")) is not None:
+                raise refusal(f"--{name}", "own_format_stated")
         return Import(read_edges(place), {}, [f"the project's own format: {','.join(HEADER)}"], [])
     readings = _find_readings(options, gates, bars)
     reading, match = readings[0], FallMatch()
@@ -116,14 +115,16 @@ def import_drops(gates: Sequence[int], bars: int, options: Namespace, fit: Fit) 
         reading, match = _choose(readings, place, fit)
         _refuse_impossible(reading, place)
     file, channels = reading.file, reading.layout.channels
-    notes = [*file.notes, _account(reading, options)]
-    if match.text:
-        notes.append(make_reason("reading_chosen", option=str(reading.layout), fit=match.text))
+    notes = [*file.notes, _account(reading, options), *_assumptions(reading, match.text, gates)]
+    notes += match.doubts
     if options.map_file and not Path(options.map_file).exists():
         Path(options.map_file).write_text(f"{reading.layout.text}\n", "utf-8")
-    pairs = [f"input {x} is the gate at channel {n}" for x, n in channels.items() if x]
-    lines = [*file.lines, *pairs, str(reading.layout), *filter(None, [match.text])]
-    notes += [*match.doubts, *_assumptions(reading, gates)]
+    lines = [
+        *file.lines,
+        *(f"input {x} is the gate at channel {n}" for x, n in channels.items() if x),
+        str(reading.layout),
+        *filter(None, [match.text]),
+    ]
     return Import([*map(reading.drop, reading.runs)], channels, lines, notes)
 
 
@@ -135,26 +136,26 @@ def _find_readings(options: Namespace, gates: Sequence[int], bars: int) -> list[
         try:
             read_file(file)
             file.stated = _read_stated(options, file, gates)
-            layouts = find_layouts(file, gates, bars)
-            readings += [x for layout in layouts if (x := FileReading(file, layout)).runs]
+            every = (FileReading(file, layout) for layout in find_layouts(file, gates, bars))
+            readings += [reading for reading in every if reading.runs]
         except InputError as error:
             faults.append(error)
-        if way + 1 >= file.ways:
+        if way + 1 >= min(file.ways, _MOST_WAYS):
             break
     if not readings:
         if faults:
             raise faults[0]
         if not file.labels:
             raise refusal(options.events, "edges_few", edges=len(file.changes))
-        pairs = ",".join(f"{name}={n}" for name, n in zip(file.labels, gates, strict=False))
+        pairs = ",".join(map("{}={}".format, file.labels, gates))
         values = {"inputs": ", ".join(file.labels), "channels": ", ".join(map(str, gates))}
         raise refusal(options.events, "inputs_unclear", **values, pairs=pairs)
-    shortest = min(readings, key=lambda reading: reading.longest)
-    if shortest.longest > LONGEST_DROP:
-        line = shortest.edges.line[shortest.edges.tick.argmax()]
-        limit = {"lasting_s": shortest.longest / TICK_HZ, "limit_s": LONGEST_DROP / TICK_HZ}
-        shortest.file.problems.refuse(line, "too_long", **limit)
-    return [reading for reading in readings if reading.longest <= LONGEST_DROP]
+    short = [reading for reading in readings if reading.longest <= LONGEST_DROP]
+    if not short:
+        last = readings[-1]  # in the smallest unit that the file may mean
+        limit = {"lasting_s": last.longest / TICK_HZ, "limit_s": LONGEST_DROP / TICK_HZ}
+        last.file.problems.refuse(last.edges.line[-1], "too_long", **limit)
+    return short
 
 
 def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[FileReading, FallMatch]:
@@ -164,11 +165,8 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
     whatever falls say. Of others a drop has to be identified, which is the evidence. What
     contradicts the file is taken only where nothing else fits nearly as well.
     """
-    by_edges = dict[int, FileReading]()
-    for reading in readings:
-        edges = reading.edges[["run", "tick", "channel", "blocked"]].tolist()
-        by_edges.setdefault(hash(tuple(edges)), reading)
-    distinct = [*by_edges.values()]
+    edge = ["run", "tick", "channel", "blocked"]
+    distinct = [*{hash(str(x.edges[edge].tolist())): x for x in readings[::-1]}.values()][::-1]
     usual = [x for x in distinct if x.is_whole and "thousands" not in x.file.facts] or distinct
     if len(usual) == 1 and "channels" in usual[0].file.stated:
         return usual[0], fit(usual[0], True)
@@ -192,30 +190,24 @@ def _choose(readings: Sequence[FileReading], place: str, fit: Fit) -> tuple[File
 
 
 def _refuse_impossible(reading: FileReading, place: str) -> None:
-    """Refuse what no drop does: the same again, or two changes at once.
-
-    An input that has a name is no wire of all gates, unless the user stated so.
-    """
-    file, layout = reading.file, reading.layout
-    is_wire = layout.groups == "passing" and "wide" not in file.facts
-    if is_wire and file.labels and "groups" not in file.stated:
-        raise refusal(place, "one_wire", option=str(layout))
+    """Refuse what no drop does: the same again, or two changes at once."""
     earlier: dict[object, int] = {}
     for run, edges in reading.runs.items():
         drop, lines = reading.drop(run), tuple(edges.line.tolist())
         # Of coarse times those of a whole drop are a copy's; of fine ones, rows may be missing.
         is_coarse = all(edge.tick % _COARSE == 0 for edge in drop.edges)
         moments: set[object] = {drop.edges} if is_coarse else {*drop.edges}
-        if layout.pause_s and lines in earlier:  # a column of another clock
+        if reading.layout.pause_s and lines in earlier:  # a column of another clock
             moments = {lines}
-        same = Counter(earlier[moment] for moment in moments & earlier.keys()).most_common(1)
-        if same and same[0][1] >= min(len(moments), max(_FEWEST_SAME, 1 + len(moments) // 2)):
-            raise refusal(place, "same_twice", run=run, other=same[0][0])
+        same = Counter(earlier[moment] for moment in moments & earlier.keys())
+        for other, count in same.most_common(1):
+            if count >= min(len(moments), max(_FEWEST_SAME, 1 + len(moments) // 2)):
+                raise refusal(place, "same_twice", run=run, other=other)
         earlier |= dict.fromkeys((lines, *moments), run)
     # Of changes alone, two in a row mean that the row of the first is missing.
     cells = Counter(reading.edges[["line", "tick", "clock"]].tolist())
     again = [line for (line, *_), count in cells.items() if count > 1]
-    if again and file.period is None:  # regular samples see changes together
+    if again and reading.file.period is None:  # regular samples see changes together
         raise refusal(place, "at_once", lines=_some(again))
 
 
@@ -239,31 +231,29 @@ def _some(lines: Sequence[int]) -> str:
     return ", ".join(map(str, lines[:8])) + (" …" if len(lines) > 8 else "")
 
 
-def _assumptions(reading: FileReading, gates: Sequence[int]) -> Iterator[Reason]:
-    """Yield what is taken to be so, and what the file lacks."""
+def _assumptions(reading: FileReading, fit: str, gates: Sequence[int]) -> list[Reason]:
+    """Return what is taken to be so, and what the file lacks."""
     file, layout = reading.file, reading.layout
+    dark, pause_s, firsts = layout.dark, layout.pause_s, ", ".join(reading.firsts)
     renamed = ", ".join(f"{name} is run {n}" for name, n in reading.renamed.items())
-    if renamed and file.changes.run.any():
-        yield make_reason("runs_renamed", runs=renamed)
-    if "thousands" in file.facts:
-        yield make_reason("thousands_parted")
-    if layout.pause_s:
-        yield make_reason("several_drops", drops=len(reading.runs), pause_s=layout.pause_s)
-    if file.period:
-        period_us = file.period / 10 ** POWERS[layout.unit or "s"] / 1e6
-        yield make_reason("samples", period_us=period_us, u_us=period_us / 12.0**0.5)
-    if absent := [str(n) for n in gates if n not in layout.channels.values()]:
-        yield make_reason("gates_absent", channels=", ".join(absent))
-    if opposite := {"high": "low", "low": "high"}.get(layout.dark):
-        yield make_reason("blocked_level", level=layout.dark, other=opposite)
-    if layout.dark == "inverted":
-        yield make_reason("states_inverted")
-    if reading.firsts:
-        code = "first_row" if layout.first == "change" else "first_unknown"
-        yield make_reason(code, input=", ".join(reading.firsts))
+    period_us = (file.period or 0) / 10 ** POWERS[layout.unit or "s"] / 1e6
+    absent = ", ".join(str(n) for n in gates if n not in layout.channels.values())
+    opposite = {"high": "low", "low": "high"}.get(dark)
     idle = ", ".join(label for label in file.labels if label not in layout.channels)
-    if idle and layout.groups != "passing":
-        yield make_reason("inputs_unused", inputs=idle)
+    rows: list[tuple[object, str, dict[str, object]]] = [
+        (fit, "reading_chosen", {"option": str(layout), "fit": fit}),
+        (renamed and file.changes.run.any(), "runs_renamed", {"runs": renamed}),
+        ("thousands" in file.facts, "thousands_parted", {}),
+        (pause_s, "several_drops", {"drops": len(reading.runs), "pause_s": pause_s}),
+        (period_us, "samples", {"period_us": period_us, "u_us": period_us / 12.0**0.5}),
+        (absent, "gates_absent", {"channels": absent}),
+        (opposite, "blocked_level", {"level": dark, "other": opposite}),
+        (dark == "inverted", "states_inverted", {}),
+        (firsts and layout.first == "state", "first_unknown", {"input": firsts}),
+        (firsts and layout.first == "change", "first_row", {"input": firsts}),
+        (idle and layout.groups != "passing", "inputs_unused", {"inputs": idle}),
+    ]
+    return [make_reason(code, **values) for is_so, code, values in rows if is_so]
 
 
 def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> dict[str, Any]:
@@ -276,8 +266,8 @@ def _read_stated(options: Namespace, file: TimerFile, gates: Sequence[int]) -> d
         raise refusal("--channel", "inputs_several", inputs=", ".join(labels))
     begins = {"dark": "dark=", "unit": "unit=", "channel": f"{labels[0] or 'input'}=", "map": ""}
     texts = {options.map_file: next(read_lines(saved), "")} if saved.is_file() else {}
-    given = [(f"--{x}", begin, getattr(options, x)) for x, begin in begins.items()]
-    texts |= {place: f"{begin}{value}" for place, begin, value in given if value is not None}
+    values = {name: getattr(options, name) for name in begins}
+    texts |= {f"--{x}": f"{begins[x]}{value}" for x, value in values.items() if value is not None}
     pairs = form("assigned").findall
     rows = [(x, *y) for x, text in texts.items() for y in pairs(text) or [(text, "")]]
     settings = {*SETTINGS}.difference(labels)

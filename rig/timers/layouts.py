@@ -4,8 +4,6 @@ A layout says what a file leaves open: the unit, which level is dark, whether pa
 gates, and which gate each input is. What each setting may be, and when, is in `layouts.txt`.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
@@ -22,8 +20,6 @@ from rig.timers.moments import TICK_HZ
 from rig.timers.timer_file import STATES, Records, TimerFile
 from rig.timers.vocabulary import POWERS, facts_held, holds, number_of
 
-_LONGEST = 60 * TICK_HZ
-"""Picoseconds: a drop lasts half a second, and nobody waits a minute until it is recorded."""
 _CLEAR_PAUSE = 3.0
 _GOOD = 0.75
 """Share of the edges that makes a reading credible."""
@@ -139,9 +135,7 @@ class FileReading:
         self.renamed = {x or "one without a name": n for x, n in rows if number_of(x) != n}
         edges.run = np.array(numbers, int)[places]
         self.edges = edges[edges.run.argsort(kind="stable")]
-        numbers.sort()
-        parts = np.split(self.edges, np.searchsorted(self.edges.run, numbers)[1:])
-        self.runs: dict[int, Records] = dict(zip(numbers, parts, strict=False))
+        self.runs = {n: self.edges[self.edges.run == n] for n in sorted(numbers)}
         self.lasting = {n: part.tick[-1] - part.tick[0] for n, part in self.runs.items()}
         self.longest = max(self.lasting.values(), default=0)
 
@@ -243,11 +237,11 @@ def find_layouts(file: TimerFile, gates: Sequence[int], bars: int) -> Iterator[F
     stated, state = file.stated, file.changes.state
     changes, drop = group_changes(file, "", "runs", 0.0)
     most = int(1 + count_before(drop * len(file.names) + changes.label).max(initial=0))
-    is_signal = np.any(state > STATES.index("blocked"))
+    kind = "signal" if np.any(state > STATES.index("blocked")) else "states"
     held = {
-        "signal" if is_signal else "states" if np.any(state) else "times": True,
+        kind if np.any(state) else "times": True,
         "many": most > bars,
-        "wire": len(file.labels) < 2 and bars == 1 < len(gates),
+        "wire": not file.labels and bars == 1 < len(gates),
         "open": None in file.powers,
         "first": np.any(file.changes.first),
     }
@@ -277,9 +271,7 @@ def _pauses(file: TimerFile, unit: str, groups: str) -> list[float]:
     is_same = (np.diff(drop) == 0) & ("run" not in file.facts)
     pauses = np.sort(np.diff(changes.tick)[is_same])
     is_clear = pauses[1:] >= np.maximum(_CLEAR_PAUSE * pauses[:-1], TICK_HZ / 2)
-    choices = [0.0, *(pauses[1:][is_clear] / TICK_HZ).tolist()[:1]]
-    is_long = not np.any(drop) and sum(pauses) > _LONGEST
-    return choices[-1:] if is_long else choices
+    return [0.0, *(pauses[1:][is_clear] / TICK_HZ).tolist()[:1]]
 
 
 def _channels(file: TimerFile, gates: Sequence[int], layout: FileLayout) -> list[dict[str, int]]:

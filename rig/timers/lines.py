@@ -1,7 +1,5 @@
 """Lines of a text file in any usual encoding, read one after the other in little memory."""
 
-from __future__ import annotations
-
 import codecs
 from collections.abc import Generator
 from pathlib import Path
@@ -42,13 +40,11 @@ def read_lines(path: str | Path) -> Generator[str]:
             problems.refuse(1, "too_large", size_mb=size / 1e6, limit_mb=MAX_BYTES / 1e6)
         with Path(path).open("rb") as file:
             start = file.read(_START)
+        has_mark = start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
         zeros = [start[n::2].count(0) * 3 > len(start) for n in (0, 1)]
-        encoding = "utf-8-sig"
-        if start.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-            encoding = "utf-16"
-        elif sum(zeros) == 1:
-            encoding = "utf-16-be" if zeros[0] else "utf-16-le"
-        elif b"\0" in start:
+        halves = {(True, False): "utf-16-be", (False, True): "utf-16-le"}
+        encoding = "utf-16" if has_mark else halves.get((zeros[0], zeros[1]), "utf-8-sig")
+        if encoding == "utf-8-sig" and b"\0" in start:
             problems.refuse(1, "not_text")
         with Path(path).open(encoding=encoding, errors="windows") as stream:
             lines = iter(lambda: stream.readline(LONGEST_LINE), "")

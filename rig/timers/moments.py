@@ -1,7 +1,5 @@
 """Times as files write them, in whole picoseconds: what a file says is what is analysed."""
 
-from __future__ import annotations
-
 from decimal import ROUND_HALF_EVEN, Context, Decimal
 from fractions import Fraction
 

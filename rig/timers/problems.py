@@ -1,20 +1,17 @@
 """Where in a CSV file something is wrong: lines and columns behind the csv module's back."""
 
-from __future__ import annotations
-
 from typing import NoReturn
 
-from rig.errors import InputError, Problem
-from rig.reasons import make_reason, remedies
+from rig.errors import InputError, Problem, RigError
+from rig.reasons import error_of, make_reason, remedies
 
 MAX_PROBLEMS = 50
 
 
-def refusal(place: str, code: str, /, **values: object) -> InputError:
+def refusal(place: str, code: str, /, **values: object) -> RigError:
     """Return the refusal of an option or of a whole file, with the remedy of its code."""
-    reason = make_reason(code, **values)
-    error = InputError(f"{place}: {reason.text}", *remedies([reason]))
-    error.reasons = (reason,)
+    error = error_of(InputError, make_reason(code, **values))
+    error.message = f"{place}: {error.message}"
     return error
 
 
@@ -30,10 +27,8 @@ class ProblemList:
     """
 
     def __init__(self, file: str, hint: str = "") -> None:
-        self.file = file
-        self.hint = hint
-        self._problems: list[Problem] = []
-        self._count = 0
+        self.file, self.hint = file, hint
+        self._problems, self._count = list[Problem](), 0
 
     def add(self, line: int, column: int, key: str, code: str, /, **values: object) -> None:
         """Note a fault: its place, a code of `WORDINGS` and the values of its sentence."""

@@ -5,8 +5,6 @@ time, logic analysers (a column an input, or value change dumps) and oscilloscop
 the same thing: at a time, an input had a value.
 """
 
-from __future__ import annotations
-
 import itertools
 import re
 from array import array
@@ -52,15 +50,15 @@ def read_file(file: TimerFile) -> TimerFile:
         head = list(itertools.islice(lines, 50))
         numbered = enumerate(itertools.chain(head, lines), 1)
         is_dump = "".join(head).lstrip().startswith(BEGINNINGS)
-        table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered, file.way)
-        file.ways = file.separators = table.ways
+        table = Table(vcd_rows(numbered, file.problems) if is_dump else numbered, file.choose)
         file.lines += [f"a table, its cells separated by {_MARKS[table.separator]}"]
         for block, group in itertools.groupby(table.rows(), lambda row: row.block):
             rows = iter(group)
             sample = [*itertools.islice(rows, _SAMPLE)]
-            if block.key not in readers:
-                readers[block.key] = SignalReader(file, block, sample)
-            changes.append(readers[block.key].read(block, itertools.chain(sample, rows)))
+            key = block.width, *(tuple(row.texts) for row in block.headings)
+            if key not in readers:
+                readers[key] = SignalReader(file, block, sample)
+            changes.append(readers[key].read(block, itertools.chain(sample, rows)))
     file.problems.raise_if_any()
     file.changes = np.concatenate(changes).view(np.recarray)
     # Below the last row text may stand.
@@ -106,19 +104,17 @@ class SignalReader:
             file.problems.refuse(line, "durations" if durations else "no_rate", **values)
         used = {column.role: column for column in reversed(columns)}
         is_filled = 2 * sum(signal.filled for signal in self.signals) > len(self.signals)
-        has_volts = "volts" in used
-        self.places = {x: used[x] for x in ("run", "gate") if x in used and not has_volts}
-        self.is_sampled = has_volts or ("level" in used and is_filled)
+        self.places = {x: used[x] for x in ("run", "gate") if x in used and "volts" not in used}
+        self.is_sampled = "volts" in used or ("level" in used and is_filled)
         self.is_whole = is_filled and (self.is_sampled or len(self.signals) > len(self.clocks))
         needed = {*self.places.values(), *self.clocks, *self.signals}
         unused = ", ".join(x.name for x in columns if x.role != "index" and x not in needed)
         file.notes += [make_reason("columns_unused", columns=unused)] if unused else []
         file.lines += [f"  {column}" for column in columns]
-        called = {re.sub("[0-9]+", "", clock.name) for clock in self.clocks if not clock.run}
+        called = {re.sub("^column|[0-9]+", "", x.name).strip() for x in self.clocks if not x.run}
         held = {
-            "wide": len(self.clocks) > len(called) == 1 and not self.is_sampled,
-            "guess": (file.way or file.ways > file.separators)
-            or any(x.filled <= _SPARSE for x in self.places.values()),
+            "wide": len(self.clocks) > len(called - {""}) == 1 and not self.is_sampled,
+            "guess": any(x.filled <= _SPARSE for x in self.places.values()),
             "sampled": self.is_sampled,
         }
         file.facts |= {*self.places, *facts_held(held)}
@@ -181,7 +177,7 @@ class SignalReader:
 
     def _read_value(self, row: Row, tick: int, signal: TimerColumn) -> bool:
         """Keep what a cell says: a sample of volts, or a state if that is a change."""
-        word = row.cell(signal.at)
+        word = signal.text(row.cell(signal.at))
         if not (word or self.is_sampled or signal.role == "moment"):
             return False
         key = signal, *self.above.values()

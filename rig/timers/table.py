@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import csv
 import itertools
+import math
 import re
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
@@ -29,7 +30,8 @@ _ROLES = _NO_ROLES | {"time", "elapsed", "state", "edge", "volts", "gate", "run"
 """Those that columns may have."""
 _Lines = Iterable[tuple[int, str]]
 """Lines of a file with their numbers."""
-_UNITS = vocabulary.POWERS | {"": 0, "hz": 0, "khz": -3, "mhz": -6, "ghz": -9, "ks/s": -3}
+_RATES = {"hz": 0, "khz": -3, "mhz": -6, "ghz": -9, "s/s": 0, "ks/s": -3, "ms/s": -6, "gs/s": -9}
+_UNITS = vocabulary.POWERS | {"": 0} | _RATES
 """Decimal power from seconds, or from hertz."""
 _JUDGED = 100
 """Lines in which values are counted."""
@@ -55,8 +57,6 @@ class RowBlock:
         Its own, without such marks.
     width
         How many cells the first row has.
-    key
-        What is the same for blocks whose columns are.
     """
 
     remarks: list[Row] = field(default_factory=list)
@@ -66,14 +66,12 @@ class RowBlock:
     gate: str = ""
     headings: list[Row] = field(default_factory=list)
     width: int = 0
-    key: object = None
 
     def begin(self, width: int) -> None:
         """Begin its rows: one without a heading as wide as these has that of the block above."""
         self.width = width
         if all(len(row.texts) != width for row in self.headings):
             self.headings += self.above
-        self.key = width, *(tuple(row.texts) for row in self.headings)
 
     def begin_below(self, mark: str) -> RowBlock:
         """Begin the block below a mark; a run or gate goes on until a mark names another."""
@@ -93,38 +91,45 @@ class RowBlock:
         filled
             Columns that have values.
         """
-        remarks = [x for x in self.remarks if len(x.texts) == width < 2 * x.count_known()]
-        remarks = [x for x in remarks if not form("assignment").search(x.raw)]
-        named = [
-            (known, len({*row.texts}), row)
-            for row in reversed(self.headings or remarks)
-            if len(row.texts) > width - 2  # rows may end with a separator
-            and row.is_text
-            and (known := row.count_known(filled))
+        rows = self.headings or [
+            row
+            for row in self.remarks
+            if len(row.texts) == width < 2 * row.count_known()
+            and not form("assignment").search(row.raw)
         ]
-        return max(named, key=lambda rank: rank[:2], default=(0, 0, Row(0, [])))[-1]
+        # Rows may end with a separator.
+        named = [row for row in reversed(rows) if len(row.texts) > width - 2 and row.is_text]
+        ranks = [(row.count_known(filled), len({*row.texts})) for row in named]
+        best = max(ranks, default=(0, 0))
+        return named[ranks.index(best)] if best[0] else Row(0, [])
 
     def find_time_base(self) -> tuple[float, float]:
         """Return the first sample's time and the step, s, that settings state; 0 without."""
-        stated, rows = dict[str, float](), [*self.remarks, *self.headings]
-        for above, below in itertools.pairwise([*rows, Row(0, [])]):
-            for n, text in enumerate(above.texts):
-                texts = [f"{text[:60]} {x[:60]}" for x in ("", above.cell(n + 1), below.cell(n))]
-                for setting in filter(None, map(form("stated value").fullmatch, texts)):
-                    name, number, unit = setting.groups()
-                    power = _UNITS.get(vocabulary.unit_of(unit.lower()) or unit.lower())
-                    if power is not None:
-                        value = float(number.replace(",", ".")) / 10.0**power
-                        stated = dict.fromkeys(roles_in(name), value) | stated
-        step = stated.get("step") or (1.0 / stated["rate"] if stated.get("rate") else 0.0)
-        return stated.get("start", 0.0), step
+        stated, rows = dict[str, float](), [*self.remarks, *self.headings, Row(0, [])]
+        texts = [
+            f"{text} {value}"[:120]
+            for above, below in itertools.pairwise(rows)
+            for n, text in enumerate(above.texts)
+            for value in ("", above.cell(n + 1), below.cell(n))
+        ]
+        for name, number, symbol in form("stated value").findall("\n".join(texts)):
+            unit = re.split("[ _]", symbol or name)[-1].lower().replace("sa/", "s/")
+            power = _UNITS.get(unit, _UNITS.get(vocabulary.unit_of(symbol)))
+            if power is not None:
+                # What is in hertz is a rate, whatever its name, if no other is.
+                roles = (
+                    roles_in(name) if unit not in _RATES else roles_in(name) - {"step"} | {"hertz"}
+                )
+                value = float(number.replace(",", ".")) / 10.0**power
+                stated = dict.fromkeys(roles, value) | stated
+        rate = stated.get("rate") or stated.get("hertz") or math.inf
+        return stated.get("start", 0.0), stated.get("step") or 1.0 / rate
 
     def find_inputs(self, count: int) -> list[str]:
         """Return names of inputs without a heading: those of a row that lists as many."""
-        for row in [*self.remarks, *self.headings]:
-            if len(named := form("gate label").findall(row.raw)) == count:
-                return named
-        return [*"ABCDEFGHIJKLMNOPQRSTUVWXYZ"]  # for a number may be taken for that of a gate
+        named = (form("gate label").findall(row.raw) for row in [*self.remarks, *self.headings])
+        # A number may be taken for that of a gate.
+        return next((x for x in named if len(x) == count), [*"ABCDEFGHIJKLMNOPQRSTUVWXYZ"])
 
 
 class Row(NamedTuple):
@@ -152,8 +157,8 @@ class Row(NamedTuple):
         """Count the cells, of some columns or of all, that say what a column is."""
         texts = [text for n, text in enumerate(self.texts) if columns is None or n in columns]
         roles = [{*(roles_in(x) & _ROLES), vocabulary.unit_of(x)} - {""} for x in texts]
-        is_heading = bool(set().union(*roles) - _NO_ROLES)
-        return sum(map(bool, roles)) if is_heading and "units" not in roles_in(texts[0]) else 0
+        is_heading = set().union(*roles) - _NO_ROLES and "units" not in roles_in(texts[0])
+        return sum(map(bool, roles)) if is_heading else 0
 
     @property
     def is_text(self) -> bool:
@@ -165,8 +170,8 @@ class Row(NamedTuple):
     def is_mark(self) -> bool:
         """Whether it says that another run, or gate, begins: ``--- Run 2 ---``."""
         # Between words, a mark has no values that are named.
-        text = vocabulary.normal(" ".join(self.texts).strip() or self.raw)
-        return form("mark").fullmatch(text.strip("-=*#:<>[] ")) is not None
+        text = vocabulary.normal(" ".join(self.texts).strip() or self.raw).strip('-=*#:<>[]" ')
+        return form("mark").fullmatch(text) is not None
 
     @property
     def is_heading(self) -> bool:
@@ -178,13 +183,11 @@ class Row(NamedTuple):
 
     def place(self, at: int) -> tuple[int, int]:
         """Return the line, and the column, from 1, at which a cell begins; 1 without the cell."""
-        if at >= len(self.texts):
-            return self.line, 1
-        begin, end, raw = 0, 0, self.raw.replace(",", ".")
-        for text in self.texts[: at + 1]:
-            begin = max(end, raw.find(text.replace(",", "."), end))
-            end = begin + len(text) + 1
-        return self.line, begin + 1
+        column, end, raw = 1, 0, self.raw.replace(",", ".")
+        for text in self.texts[: at + 1] if at < len(self.texts) else []:
+            column = 1 + max(end, raw.find(text.replace(",", "."), end))
+            end = column + len(text)
+        return self.line, column
 
 
 class Table:
@@ -194,6 +197,8 @@ class Table:
     ----------
     lines
         All of them, one after the other, with their numbers.
+    choose
+        Returns which of several answers is tried where lines leave a question open.
 
     Attributes
     ----------
@@ -205,18 +210,17 @@ class Table:
         Lines among rows that are neither rows nor headings: with a value, or without.
     """
 
-    def __init__(self, lines: _Lines, way: int = 0) -> None:
+    def __init__(self, lines: _Lines, choose: Callable[..., str]) -> None:
         self.strays, self.words = list[int](), list[int]()
-        unwrapped = ((number, piece) for number, line in lines for piece in _unwrap(line))
+        unwrapped = _split_lists((number, _unwrap(line)) for number, line in lines)
         sample = list(itertools.islice(unwrapped, _SAMPLE))
         plain = [line for _, line in sample if line.strip() and not vocabulary.is_remark(line)]
         self._names, named = _find_names(plain)
         self._lines: Iterator[tuple[int, str]] = itertools.chain(sample, unwrapped)
         if self._names:
             self._lines = _join_fields(self._lines, self._names)
-        separators = find_separators(plain, named)
-        self.separator, self.has_thousands = separators[way % len(separators)], False
-        self._usual: _Shape = ()
+        self.separator = choose(*find_separators(plain, named))
+        self.has_thousands, self._usual = False, _Shape()
         shapes = Counter(x for x in map(_shape, map(self.split, plain)) if any(map(all, x)))
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
@@ -224,8 +228,7 @@ class Table:
         texts = itertools.chain(*map(self.split, plain))
         fractions = [text for text in texts if "fraction" in kinds_of(text)]
         is_open = any(fractions) and all(map(form("thousands").fullmatch, fractions))
-        self.ways = len(separators) * (1 + is_open)
-        self.has_thousands = is_open and way // len(separators) % 2 > 0
+        self.has_thousands = is_open and choose("decimals", "thousands") == "thousands"
 
     def split(self, line: str) -> list[str]:
         """Split a line into cells; numbers get a decimal point, and what is missing is empty."""
@@ -237,14 +240,7 @@ class Table:
             again = [x for x in values.keys() - self._names if (x[0], 0) in self._names]
             return [values.get(x, "") for x in (*self._names, *again)] if values else [line]
         cells = split_cells(line, self.separator, self._usual)
-        missing, has_comma = vocabulary.words()["missing"], form("decimal comma").fullmatch
-        cells = ["" if text[:5].casefold() in missing else text for text in cells]
-        if form("apart").search(line):
-            grouped = form("grouped").fullmatch
-            cells = [form("mark of thousands").sub("", x) if grouped(x) else x for x in cells]
-        if self.has_thousands:
-            cells = [re.sub("(?<=[0-9])[.,]", "", text) for text in cells]
-        return [text.replace(",", ".") if has_comma(text[:LONGEST]) else text for text in cells]
+        return [_read_cell(text, self.has_thousands) for text in cells]
 
     def rows(self) -> Iterator[Row]:
         """Yield each row of data."""
@@ -298,28 +294,64 @@ class Table:
 def split_cells(line: str, separator: str, usual: _Shape = ()) -> list[str]:
     """Split a line into cells, without the blanks and the quotes around them."""
     quote = "'" if line.lstrip()[:1] == "'" else '"'
-    if quote in line:
-        (cells,) = csv.reader([line], delimiter=separator, quotechar=quote, skipinitialspace=True)
-    elif separator == " ":
+    if quote in line or separator != " ":
+        reader = csv.reader([line], delimiter=separator, quotechar=quote, skipinitialspace=True)
+        cells = next(reader, [])
+    else:
         # A heading has names of several words: two blanks or more part them.
         cells = [word.strip(":") for word in line.split()]
         is_row = len(cells) == len(usual) or _begins_as(cells, usual) or all(map(kinds_of, cells))
         cells = cells if is_row else re.split(r" {2,}|\t", line.strip())
-    else:
-        cells = line.split(separator)
     return [text.strip().strip('"').strip() for text in cells]
 
 
-def _unwrap(line: str) -> list[str]:
-    """Return a line without the brackets around it; lists in a line are lines of their own."""
+@lru_cache(10_000)
+def _read_cell(text: str, has_thousands: bool) -> str:
+    """Return a cell in which a number has a decimal point and no mark of thousands."""
+    if text[:5].casefold() in vocabulary.words()["missing"]:
+        return ""
+    if has_thousands:
+        text = re.sub("(?<=[0-9])[.,]", "", text)
+    if form("grouped").fullmatch(text[:LONGEST]):
+        text = form("mark of thousands").sub("", text)
+    return text.replace(",", ".") if form("decimal comma").fullmatch(text[:LONGEST]) else text
+
+
+@lru_cache(10_000)
+def _unwrap(line: str) -> str:
+    """Return a line without a remark behind it, and without a monitor's clock before it."""
     if form("plain row").fullmatch(line):  # as most
-        return [line]
+        return line
     line = form("remark behind").sub("", form("exponent of Fortran").sub("E", line))
-    line = form("clock before").sub(r"\1\5 ", line)  # the monitor's, not the program's
-    if not form("list").match(line):
-        return [line]
-    pieces = form("between lists").split(line)
-    return [form("list").sub("", piece, 1).rstrip("])}, ;") for piece in pieces]
+    return form("clock before").sub(r"\1\5 ", line)
+
+
+def _split_lists(lines: _Lines) -> Iterator[tuple[int, str]]:
+    """Make a line of what stands between brackets, be it in a line or over several.
+
+    A list has its name before it, that of a run or of a gate as a mark above it; an object with a
+    name is part of what it stands in.
+    """
+    number, text, levels = 0, "", list[bool]()
+    for number, line in lines:
+        if vocabulary.is_remark(line) or not (levels or form("list").match(line)):
+            yield number, line
+            continue
+        if len(text) > 100 * LONGEST:  # a bracket that nothing closes
+            levels.clear()
+        for piece in (*form("piece of a list").findall(line), " "):
+            is_part = bool(levels) or piece != " "
+            if piece[-1] in "[({":
+                name = text[-LONGEST:].rstrip()
+                is_part = name.endswith((":", "="))
+                levels.append(is_part and piece == "{")
+                is_part &= not any(vocabulary.find_label(name, x) for x in ("run", "gate"))
+            elif piece in {"]", ")", "}"}:
+                is_part = bool(levels) and levels.pop()
+            if not is_part:
+                yield number, text.strip(" ,;").replace('"', "")
+            text = (text.rstrip(" :=") + ", " if piece == "[" else text + piece) * is_part
+    yield number, text
 
 
 @lru_cache(1)

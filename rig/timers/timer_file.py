@@ -4,8 +4,6 @@ What a file does not say (which gate, which level is dark, which unit) is left t
 `rig.timers.layouts`.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections import defaultdict
 from pathlib import Path
@@ -35,12 +33,17 @@ Records: TypeAlias = Any
 class TimerFile:
     """What was understood of a file.
 
+    Parameters
+    ----------
+    way
+        Number, from 0, of the way of reading what it leaves open.
+
     Attributes
     ----------
     path
         Where it is.
-    way, ways, separators
-        In which way, from 0, its columns are understood; how many there are, and separators.
+    ways
+        How many ways there are of reading it, as far as questions came up.
     lines
         In words: what kind of file, and what each column was taken for.
     names
@@ -72,23 +75,28 @@ class TimerFile:
     """
 
     def __init__(self, path: str | Path, way: int = 0) -> None:
-        self.path, self.way = path, way
-        self.ways = self.separators = 1
+        self.path, self._rest, self.ways = path, way, 1
         self.names = defaultdict[str, int](itertools.count(1).__next__, {"": 0})
         self.changes: Records = np.recarray(0, CHANGE)
         self.period: int | None = None
         self.powers = set[int | None]()
         self.facts = set[str]()
         self.rows = self.last_row = 0
-        self.unread = list[int]()
-        self.lines = list[str]()
-        self.notes = list[Reason]()
+        self.unread, self.lines, self.notes = list[int](), list[str](), list[Reason]()
         self.stated = dict[str, Any]()
         self.problems = ProblemList(str(path), make_reason("timer_files").text)
+
+    def choose(self, *answers: Any) -> Any:
+        """Return which answer is tried to a question that the file leaves open.
+
+        In the first way it is the first, the most usual.
+        """
+        self.ways *= len(answers)
+        self._rest, n = divmod(self._rest, len(answers))
+        return answers[n]
 
     @property
     def labels(self) -> list[str]:
         """What the file calls inputs that change, in order; none where it does not say."""
-        names, changes = [*self.names], self.changes[~self.changes.first]
-        labels = [names[label] for label in np.unique(changes.label) if label]
-        return sorted(labels, key=lambda label: (number_of(label) or 0, label))
+        names, places = [*self.names], {*self.changes.label[~self.changes.first].tolist()} - {0}
+        return sorted((names[x] for x in places), key=lambda label: (number_of(label) or 0, label))

@@ -1,7 +1,5 @@
 """Value change dumps (IEEE 1364, clause 18) as a table: a row for each time, a column a wire."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Where something was, frame by frame, as trackers of videos write it: t, x, y."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import NamedTuple
 
@@ -39,11 +37,11 @@ def read_video(path: str | Path) -> VideoTrack:
         Another kind of file, too few frames, or values that are no numbers, at their places.
     """
     problems = ProblemList(str(path), make_reason("video_files").text)
-    table = Table(enumerate(read_lines(path), 1))
+    table = Table(enumerate(read_lines(path), 1), lambda usual, *_: usual)
     rows = list(table.rows())
     track = [row for row in rows if row.block is rows[0].block]
-    above = rows[0].block.headings if rows else []
-    heading = next((row for row in reversed(above) if len(_find_axes(row)) == len(_SCALES)), None)
+    above = reversed(rows[0].block.headings if rows else [])
+    heading = next((row for row in above if len(_find_axes(row)) == len(_SCALES)), None)
     if heading is None:
         problems.refuse(1, "no_track")
     axes = sorted(_find_axes(heading).items())

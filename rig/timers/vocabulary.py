@@ -1,7 +1,5 @@
 """What words in a timer's file mean: the roles of headings, units of time, states of a beam."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from collections.abc import Collection, Mapping
@@ -64,9 +62,9 @@ def normal(heading: str) -> str:
 def roles_in(heading: str) -> frozenset[str]:
     """Return the roles of which a heading has a word, and ``setting`` where it names one."""
     facts = {role for role in words() if form(f"<begin><{role}><end>").search(normal(heading))}
-    is_setting = is_number(heading) or bool(TIME_BASE & facts)
-    facts |= {"gate"} if find_label(heading, "gate") else set()
-    return frozenset(facts | ({"setting"} if is_setting else set()))
+    is_setting = is_number(heading) or TIME_BASE & facts
+    held = {"gate": find_label(heading, "gate"), "setting": is_setting}
+    return frozenset(facts | facts_held(held))
 
 
 @lru_cache(10_000)

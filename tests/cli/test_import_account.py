@@ -119,6 +119,9 @@ def test_known_formats_are_listed(call):
         "time (s),state\n" + "1" * 20_000 + ",1\n0.2,0\n",
         "a=" * 10_000 + "\n",
         ",".join("1" * 20_000) + "\n",
+        "[" * 19_000 + "\n",
+        '{"a": ' * 3000 + "\n",
+        "[\n" + "0.1,\n" * 20_000,
     ],
 )
 def test_a_hostile_file_is_read_or_refused_at_once(tmp_path, content):

@@ -121,8 +121,9 @@ def vcd(edges: Truth) -> str:
 
 PLACES = ("top", "upper", "lower", "bottom")
 ROWS = json.loads(Path(__file__).with_name("rows.json").read_text("utf-8"))
-"""What stands above, a row, words for blocked and clear, how many runs, what is below, marks; of
-scopes what stands above, a row, how a value is written, what parts them, whether they are bare."""
+"""Whole files and how many runs they have; what stands above, a row, words for blocked and clear,
+how many runs, what is below, marks; of scopes what stands above, a row, how a value is written,
+what parts them, whether they are bare."""
 
 
 def write(form: str, words: str = "", runs=RUNS[:1], mark: str = "") -> str:
@@ -165,6 +166,7 @@ def from_scopes(group: str) -> dict[str, Shape]:
 def shapes() -> dict[str, Shape]:
     """Return every shape by its name."""
     found = from_rows("shapes") | from_scopes("scopes")
+    found |= {name: text(content, runs) for name, (content, runs) in ROWS["files"].items()}
     found["cp1252"] = text(found["cp1252"].content.decode(), encoding="cp1252")
 
     def states(n):
@@ -200,11 +202,6 @@ def shapes() -> dict[str, Shape]:
     for name, mark in (("with", "--- Run {} ---\n"), ("without", "")):
         lines = write("{c},{us},{d}\n", runs=by_one_clock, mark=mark)
         found[f"Arduino {name} marks"] = text("Gate,Micros,State\n" + lines, 3)
-    found["Serial plotter"] = text("".join(
-        f"time_us:{t * 1e6:.0f} "
-        + " ".join(f"gate{g}:{v}" for g, v in enumerate(levels(RUNS[0], t)))
-        + "\n"
-        for t, _, _ in [(0.0, 0, False), *RUNS[0]]))  # fmt: skip
     found["OWON in microseconds"] = scope(
         "Channel\t\t:,CH1,CH2,CH3,CH4\nFrequency\t:,F=?,F=?,F=?,F=?\n"
         "Vertical pos\t:,0.00mV,0.00mV,0.00mV,0.00mV\nTime interval\t:,200.00uS\n\n"
@@ -259,14 +256,6 @@ def shapes() -> dict[str, Shape]:
         ("with a cell left empty", [initial.replace(",0", ",", 1), *changes], RUNS[0]),
     ):
         found[f"Saleae {name}"] = Shape((head + "".join(rows)).encode(), [truth])
-    start = 2**32 - 500_000
-    found["A counter that overflows within a run"] = text("run,gate,micros,state\n" + table(
-        [n, c, (round((t + 8 * n) * 1e6) + start - 16_000_000) % 2**32, int(d)]
-        for n, edges in enumerate(RUNS, 1) for t, c, d in edges), 3)  # fmt: skip
-    found["Vernier, latest run in between"] = Shape(
-        ("Run 1: Time (s),Latest: Time (s),Run 2: Time (s)\n"
-         + table([f"{edges[k][0]:.6f}" for edges in (RUNS[0], RUNS[2], RUNS[1])]
-                 for k in range(8))).encode(), RUNS)  # fmt: skip
     one = ("--channel", "0")
     on, off = (time for time, _, _ in by_gate(RUNS[0])[0])
     found["phyphox, start and stop"] = Shape(
@@ -294,17 +283,6 @@ def shapes() -> dict[str, Shape]:
         ).encode(),
         [[e for e in edges if e[2]] for edges in RUNS],
     )
-    found["Blocked and unblocked of each gate"] = Shape(
-        (
-            ",".join(f"Gate {g} {w} (s)" for g in HEIGHTS for w in ("blocked", "unblocked"))
-            + "\n"
-            + table([f"{t:.6f}" for t, _, _ in edges] for edges in RUNS)
-        ).encode(),
-        RUNS,
-    )
-    found["Gates below each other"] = text("".join(
-        f"Gate {g}\nTime (s)\n" + "".join(f"{t:.6f}\n" for t, _, _ in edges)
-        for g, edges in by_gate(RUNS[0]).items()))  # fmt: skip
     tds = ["Record Length,4e+03,", "Sample Interval,2e-04,", "Trigger Point,0,", "Source,CH{},",
            "Vertical Units,V,", "Horizontal Units,s,"]  # fmt: skip
     for name, gates, options in (
