@@ -21,7 +21,8 @@ DONE = 0.1
 no result changes by 0.001 standard uncertainties."""
 PATIENT = 4
 """Short steps in a row after which a fit has converged. An edge at the moment of an impact has a
-different slope on either side, and steps may alternate between them."""
+different slope on either side, and steps may alternate between them. Also the steps after which a
+drop is matched anew."""
 _DAMPED = 1e-3  # first λ of Levenberg and Marquardt
 _FACTOR = 4.0  # by which λ grows with each rejected step, and shrinks with each accepted one
 _GAIN = 0.25  # least share of the linear prediction by which a step reduces the loss

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bench.studies.falls import Asked, falls
+from bench.studies.layout_catalogue import Kind, graded, under
 from bench.studies.time_scales import time_scale
 from rig.analysis.chain_records import chain_records
 from rig.analysis.departures import lags, strike_u
@@ -17,7 +18,7 @@ from rig.analysis.dual import Dual
 from rig.analysis.gravity import free_gravity
 from rig.analysis.quantities import AdjustedDrop
 from rig.protocol.protocol import Contact
-from rig.protocol.reader import parse
+from rig.protocol.reader import parse, read
 from rig.units import Quantity
 from tests.analysis.drops import PROTOCOLS, SCENES, assert_true, case
 from tests.analysis.sessions import MILD, analysis
@@ -110,6 +111,21 @@ def test_gravity_by_a_graded_chain_is_right_where_air_makes_its_strings_taut():
         gravity = free_gravity(fit)
         off.append((gravity.value - graded.gravity.value) / gravity.u)
     assert np.sqrt(np.mean(np.square(off))) < 1.5, off
+
+
+@pytest.mark.usefixtures("loops_compiled")
+def test_the_skew_holds_where_each_rod_below_lags_alone(tmp_path):
+    """In the resolved world: no string holds a thin rod that falls behind the thick ones above."""
+    path, off = tmp_path / "thin-below.yaml", []
+    shares = (0.15, 0.3, 0.5, 0.75), (0.18, 0.35, 0.55, 0.75)
+    path.write_text(under(Kind("", graded((6, 9, 14, 20, 28), 1200)), *shares).protocol())
+    protocol, url = read(path), f"sim://?dynamics=resolved&drag=0.03&protocol={path}"
+    run = next(run for run in protocol.runs() if run.incline_deg == 40.0)
+    for fall in falls([Asked(url, [1, 2, 3], [[run.number]] * 3)]):
+        result, _ = DropCase(protocol, run, fall.drop, time_scale(fall.seed)).read()
+        skew = result.quantities["release_skew_s"]
+        off.append((skew.value - fall.truth["release_skew_s"]) / skew.u)
+    assert np.abs(off).max() < 2.0, off
 
 
 def test_a_top_rod_strikes_as_high_as_rods_are_thick_unless_stated():
