@@ -179,7 +179,7 @@ def _read(fall: SideFall, earliest: float, batches: int | None) -> list[FallFit]
     """Anneal batches of starts until a reading explains the edges; the likeliest first."""
     readings: list[FallFit] = []
     least, matchable = LEAST * fall.record.edge_count, fall.pairing.matchable
-    enough = max(least, FAIR * matchable)
+    enough = max(least, (1.0 - MISSED) * matchable)
     if not fall.record.edges.times.size or matchable < least:
         return readings
     for starts in itertools.islice(fall.starts(earliest, least), batches):
