@@ -21,8 +21,7 @@ DONE = 0.1
 no result changes by 0.001 standard uncertainties."""
 PATIENT = 4
 """Short steps in a row after which a fit has converged. An edge at the moment of an impact has a
-different slope on either side, and steps may alternate between them. Also the steps after which a
-drop is matched anew."""
+different slope on either side, and steps may alternate between them."""
 _DAMPED = 1e-3  # first λ of Levenberg and Marquardt
 _FACTOR = 4.0  # by which λ grows with each rejected step, and shrinks with each accepted one
 _GAIN = 0.25  # least share of the linear prediction by which a step reduces the loss
@@ -75,7 +74,7 @@ class Estimate:
 
 
 def adjust(
-    model: DropModel, matches: Matches, x: Array, centre: Array | None = None, steps: int = STEPS
+    model: DropModel, matches: Matches, x: Array, centre: Array | None = None, done: float = DONE
 ) -> Estimate:
     """Fit all unknowns of a drop to its matched edges.
 
@@ -90,8 +89,8 @@ def adjust(
         First guess.
     centre
         Prior means of the unknowns, zero if not given.
-    steps
-        Greatest number of steps.
+    done
+        Length of the last step, see `length`.
     """
 
     def about(at: Array, inflation: float) -> Linearization:
@@ -99,7 +98,7 @@ def adjust(
 
     at = model.unknowns
     centre = np.where(at.flat, math.nan, 0.0 if centre is None else centre)
-    return least_squares(about, at.sd, x, centre, steps=steps)
+    return least_squares(about, at.sd, x, centre, done)
 
 
 @np.errstate(all="ignore")  # a step to a NaN loss is rejected

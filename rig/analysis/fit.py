@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.analysis.adjust import PATIENT, STEPS, Estimate, adjust
+from rig.analysis.adjust import Estimate, adjust
 from rig.analysis.annealing import PART, count_matched, log_density, matched
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import HUBER, STRAY
@@ -125,11 +125,11 @@ def settle(model: DropModel, x: Array, matches: Matches | None = None) -> Fit:
         Matches to begin with; those at `x` if not given.
     """
     matches = match(model, x) if matches is None else matches
-    for steps in [PATIENT] * (_ROUNDS - 1) + [STEPS]:
-        used, estimate = matches, adjust(model, matches, x, steps=steps)
+    for _ in range(_ROUNDS):
+        used, estimate = matches, adjust(model, matches, x)
         x = estimate.x
         matches = without_strays(model, x, match(model, x))
-        if estimate.settled and all(np.array_equal(used[role], matches[role]) for role in used):
+        if all(np.array_equal(used[role], matches[role]) for role in used):
             break
     return Fit(model, used, x, estimate)
 
