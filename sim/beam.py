@@ -85,7 +85,7 @@ def receive(
         edges.append(SeenEdge(shadow.end, channel, False, end_rod))
     if dials.chatter:
         edges = [seen for edge in edges for seen in _flicker(edge, dials, rng)]
-    jitter = rng.normal(0.0, 1.0, len(edges)) * dials.jitter_sd
+    jitter = rng.normal(0.0, dials.jitter_sd, len(edges))
     noisy: list[SeenEdge] = []
     last = 0.0
     for edge, error in zip(edges, jitter, strict=True):

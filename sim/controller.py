@@ -181,9 +181,7 @@ class Microcontroller:
         return self._identity
 
     def _status(self) -> wire.State:
-        order = self.order
-        if self.drop is not None:
-            order = self.drop.order
+        order = self.order if self.drop is None else self.drop.order
         events = len(self.drop or ())
         return wire.State(self.phase, self.gates, order.label if order else 0, events)
 

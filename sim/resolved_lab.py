@@ -10,7 +10,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from rig.errors import InputError
 from rig.link.messages import pack_label, unpack_label
@@ -44,6 +43,7 @@ MOST_S, TOLD_S = 120.0, 5.0
 """Processor time of a fall that is refused, and of a drop that is told of before it is made, s."""
 TRACK_S = 1 / 960
 """Between two moments of the track: half a frame of the paper's camera."""
+_LAST = 100  # samples that show how a fall goes on, 5 ms
 ROD_LENGTH = 0.102
 """Of the paper's chains, m, where a protocol does not say it."""
 
@@ -229,7 +229,9 @@ def top_at(fall: Fall, times_s: Any) -> Any:
     A short free chain may be let fall beside a long one that strikes after the short one's end:
     it falls on as it fell last.
     """
-    return CubicSpline(fall.times, fall.heights[:, -1])(times_s)
+    last = np.polyfit(fall.times[-_LAST:], fall.heights[-_LAST:, -1], 2)
+    seen = np.interp(times_s, fall.times, fall.heights[:, -1])
+    return np.where(fall.times[-1] < times_s, np.polyval(last, times_s), seen)
 
 
 def at_level(struck: Fall, gravity: float) -> tuple[float, float]:
@@ -250,10 +252,9 @@ def at_level(struck: Fall, gravity: float) -> tuple[float, float]:
     if contact >= 0.0:
         passing = math.sqrt(speed**2 + 2.0 * gravity * contact)
         return struck.strike_s + 2.0 * contact / (speed + passing), passing
-    after = int(np.argmax(struck.heights[:, -1] < 0.0))
-    near = slice(after - 1, after + 1)
-    (t0, t1), (z0, z1) = struck.times[near], struck.heights[near, -1]
-    return float(t0 + (t1 - t0) * z0 / (z0 - z1)), float((z0 - z1) / (t1 - t0))
+    near = np.argmax(struck.heights[:, -1] < 0.0) + np.array([0, -1])
+    times, heights = struck.times[near], struck.heights[near, -1]
+    return float(np.interp(0.0, heights, times)), float(np.ptp(heights) / np.ptp(times))
 
 
 def _bounce(surface: Surface, dials: ResolvedDials) -> Bounce:

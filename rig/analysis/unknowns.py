@@ -245,7 +245,7 @@ def _slack_sd(side: Side) -> Array | None:
     A rod that air slows more than those above may lag behind them, as far as air slows it alone:
     strings pull, but do not push. Like strikes before their time, that departs from the equations.
     """
-    loose, air = np.minimum.accumulate(side.record.unlike), math.hypot(*prior_air(side.protocol))
+    loose, air = np.minimum.accumulate(side.record.unlike), _lag_sd(side) or 0.0
     lag = (loose - loose.mean()) * side.model.components.landed * air * SLACK_WAY**2 / 3.0
     return np.hypot(_top_sd(side), lag) if side.record.unlike.any() else None
 
