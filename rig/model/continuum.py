@@ -129,12 +129,8 @@ def end_speed(chain: UniformChain) -> float:
     With any initial speed ``V² = V_h² (A/γs)^2α + 2gγs ((A/γs)^(1+2α) − 1)/(1+2α)``, written as a
     sum of positive terms; infinite where γs = 0 and α > 0.
     """
-    if chain.reach_m == chain.alpha == 0.0:  # nothing pulls
-        way = chain.drop_m + chain.length_m
-        return free_leg(way, chain.initial_speed, chain.gravity)[0]
-    if chain.reach_m == 0.0:
-        return math.inf
-    ratio, power = chain.length_m / chain.reach_m, chain.power
+    ratio = chain.length_m / chain.reach_m if chain.reach_m > 0.0 else math.inf
+    power = chain.power
     pulled = chain.pull * math.expm1(-power * math.log1p(ratio)) / power
     try:
         # A power of the ratio itself: its logarithm would be rounded before it is multiplied up.
@@ -188,9 +184,8 @@ def _substitution(chain: UniformChain, span: float) -> tuple[float, float]:
     V² is zero at x = −x₀ (x₀ ≈ V_h²/2gA for a small drop), and x + x₀ is to be the square of
     p + q/2 but for a factor: q²/(4(1 + q)) = x₀/X.
     """
-    if chain.pull == 0.0:
-        return 0.0, 1.0
-    zero = math.log1p(chain.power * chain.strike_speed**2 / chain.pull) / chain.power / span
+    ratio = chain.strike_speed**2 / chain.pull if chain.pull > 0.0 else math.inf
+    zero = math.log1p(chain.power * ratio) / chain.power / span
     if math.isinf(zero):
         return 0.0, 1.0
     q = 2.0 * (zero + math.sqrt(zero) * math.sqrt(1.0 + zero))

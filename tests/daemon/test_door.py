@@ -9,7 +9,7 @@ from itertools import product
 import pytest
 
 from bench.process_fixture import ProcessFixture
-from rig.errors import RigError
+from rig.errors import RigError, SessionError
 from rig.session.store import Session
 from tests.daemon.at_work import ended, let_fall, working
 from tests.refusals import refused
@@ -75,6 +75,7 @@ def test_where_all_was_deleted_under_it_it_saves_what_it_has_and_ends(processes,
     attempt = let_fall(lambda work: work(client))
     client.collect(1, attempt)
     client.close()
+    refused(SessionError, "no session is open", getattr, client, "session")
     for path in processes.folder.glob("session*"):
         path.unlink()
     elsewhere = processes.folder.rename(processes.folder.with_name(f"gone-{os.getpid()}"))

@@ -30,31 +30,15 @@ def test_what_is_written_is_read(old, new, name, value):
     assert attrgetter(name)(parse(GOOD.replace(old, new))) == value
 
 
-def test_a_chain_inherits_and_overrides():
-    protocol = parse(GOOD.replace("{like: A}", "{like: A, rods: 20, length: 1 m}"))
-    a, b = protocol.chains.values()
-    assert (b.chain.rods, b.chain.length) == (20, 1.0)
-    assert b.tilt_deg == a.tilt_deg
-    assert b.widths[0] == a.widths[0]
-
-
 def chains(a, b="like: A"):
     text = protocol_text("five-rods").replace("rods: 5, length: 200 mm", a).replace("like: A", b)
     return parse(text).chains
 
 
-def test_a_chain_is_weighed_rod_by_rod_and_inherited():
-    a, b = chains("rods: 2, length: 200 mm, masses: [12 g, 11.5 g]").values()
-    assert a.weighed
-    assert b.chain == a.chain
-    a = chains("rods: 5, length: 200 mm, masses: {exponential: {bottom: 16 g, top: 1 g}}")["A"]
-    assert (a.chain.masses[0], a.chain.masses[-1]) == (0.016, 0.001)
-
-
 @cases
 def test_a_chain_is_as_it_is_written(a, b, of, has, values, within):
     """Where nothing is computed, to the last bit."""
-    found = getattr(chains(a, b)[of].chain, has)
+    found = attrgetter(has)(chains(a, b)[of])
     assert found == pytest.approx(values, rel=within, abs=0.0)
 
 
@@ -64,16 +48,6 @@ def test_a_table_may_end_where_the_chain_does(rods):
     table = "[{height: 0 mm, mass: 10 g}, {height: 1165 mm, mass: 3 g}]"
     found = chains(f"rods: {rods}, length: 1165 mm, masses: {{table: {table}}}")["A"]
     assert found.chain.masses[-1] == pytest.approx(0.003, rel=1e-12)
-
-
-def test_graded_chain_has_equal_gaps_and_masses_like_cross_sections():
-    rods = next(iter(read(next(p for p in READY if "graded" in p.stem)).chains.values()))
-    diameters = [d for d in (0.032, 0.025, 0.019, 0.013, 0.0063) for _ in range(4)]
-    heights = rods.chain.heights
-    edges = [heights[i + 1] - heights[i] - (diameters[i] + diameters[i + 1]) / 2 for i in range(19)]
-    assert edges == pytest.approx([edges[0]] * 19, abs=1e-15)
-    assert rods.chain.length == 1.165
-    assert rods.chain.masses == pytest.approx([(d / 0.032) ** 2 for d in diameters])
 
 
 @cases

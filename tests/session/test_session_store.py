@@ -164,7 +164,8 @@ def test_who_only_reads_cannot_write(path):
 
 
 def test_a_snapshot_does_not_move_while_another_writes(path):
-    with make(path) as writer, Session.open(path, readonly=True) as reader:
+    make(path).close()
+    with Session.open(path, readonly=True) as reader, Session.open(path) as writer:
         writer.log_bytes("rx", 1, b"x")
         writer.commit()
         with reader.snapshot():
