@@ -23,9 +23,12 @@ def test_any_number_of_gates_finds_a_place(scene, gates):
     protocol = parse(draft_text(draft))
     check_recordable(protocol)
     assert protocol.title == f'What "{scene}" says'
-    assert len(protocol.gates.gates) == gates
-    assert len({(gate.side, gate.height) for gate in protocol.gates.gates}) == gates
-    assert {gate.side for gate in protocol.gates.gates} == {*sides}
+    heights = {side: [g.height for g in protocol.gates.gates if g.side == side] for side in sides}
+    assert sum(map(len, heights.values())) == gates
+    if gates == 12:
+        assert heights == {
+            side: pytest.approx([mm * 1e-3 for mm in of]) for side, of in sides.items()
+        }
     assert (protocol.track is not None) == (scene == "track")
     trial = parse(draft_text(draft.trial()))
     assert (len(trial.plan.inclines), trial.plan.repeats) == (1, 4)
