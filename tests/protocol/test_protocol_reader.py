@@ -62,12 +62,13 @@ def test_each_fault_is_found_at_its_place(scene, changes, starts):
         assert_one_block(problem)
 
 
-def test_alias_bomb_is_refused():
+def test_alias_bombs_and_towers_of_brackets_are_refused():
     lines = ["a: &a [1, 1, 1, 1, 1, 1, 1, 1, 1]"]
     lines += [
         f"{b}: &{b} [{', '.join(['*' + a] * 9)}]" for a, b in zip("abcdef", "bcdefg", strict=True)
     ]
     assert "more than 10000 values" in problems("\n".join(lines))[0]
+    assert "or 32 levels" in problems(900 * "[")[0], "before Python's own limit"
 
 
 def test_an_order_that_one_chain_cannot_take_is_read_where_it_was_accepted_once():
