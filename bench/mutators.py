@@ -105,6 +105,8 @@ def _only_read(node: ast.AST) -> bool:
             return True
         case ast.Expr(value=ast.Constant()) | ast.JoinedStr() | ast.Assert():
             return True
+        case ast.keyword("strict", ast.Constant(True)):  # an assertion of zip
+            return True
         case ast.Expr(value=ast.Call(func=ast.Attribute(value=ast.Name(id="log")))):
             return True
         case ast.Assign(targets=[ast.Name(id="__all__" | "__slots__")]):

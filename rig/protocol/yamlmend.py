@@ -128,11 +128,7 @@ def _list_mends(text: str, at: int, begin: int, table: list[str]) -> Iterator[Me
                 first, last = match.span("old")
                 words = {name: quote(part) for name, part in match.groupdict().items()}
                 message = sentence.format(**words, opened=opened, close=close)
-                added = {
-                    "close": close,
-                    "quoted": json.dumps(match["old"], ensure_ascii=False),
-                    **_NEW,
-                }
+                added = {"close": close, "quoted": json.dumps(match["old"]), **_NEW}
                 mended = text[:first] + added.get(new, new) + text[last:]
                 yield (match.start("at") if "at" in words else opening), message, mended
 
