@@ -16,19 +16,17 @@ DRAFTS = read_table(__file__, "drafts")
 
 
 @pytest.mark.parametrize("scene", SCENES)
-@pytest.mark.parametrize("gates", [2, 3, 4, 6, 12])
+@pytest.mark.parametrize("gates", [2, 3, 4, 5, 12])
 def test_any_number_of_gates_finds_a_place(scene, gates):
-    sides, answers = DRAFTS[scene]
+    places, answers = DRAFTS[scene]
     draft = Draft(f'What "{scene}" says', scene, gates, repeats=8, **answers)
     protocol = parse(draft_text(draft))
     check_recordable(protocol)
     assert protocol.title == f'What "{scene}" says'
-    heights = {side: [g.height for g in protocol.gates.gates if g.side == side] for side in sides}
+    drilled = [(gate.side, round(gate.height * 1e3, 6)) for gate in protocol.gates.gates]
+    heights = {side: [mm for at, mm in drilled if at == side] for side in places[5]}
     assert sum(map(len, heights.values())) == gates
-    if gates == 12:
-        assert heights == {
-            side: pytest.approx([mm * 1e-3 for mm in of]) for side, of in sides.items()
-        }
+    assert heights == places.get(gates, heights)
     assert (protocol.track is not None) == (scene == "track")
     trial = parse(draft_text(draft.trial()))
     assert (len(trial.plan.inclines), trial.plan.repeats) == (1, 4)
