@@ -9,7 +9,8 @@ from pathlib import Path
 from rig.errors import RigError
 from rig.link.messages import DisarmReason, RefusalReason
 from rig.reasons import _PHRASES, WORDINGS, make_reason, rig_error
-from rig.vocabulary import Vocabulary
+from rig.vocabulary import VOCABULARIES, Vocabulary
+from tests.tables import cases
 
 RIG = Path(__file__).parents[1] / "rig"
 RAISERS = {"make_reason": 0, "rig_error": 0, "plain_reason": 1, "problem": 1,
@@ -131,7 +132,7 @@ def test_each_code_has_a_plain_sentence():
         assert not re.search(r"\bshall\b|\blest\b|\bas well may\b", said), code
 
 
-def test_a_reason_has_its_values_in_its_sentence():
-    reason = make_reason("wrong_answer", request="Arm", expected="Armed", answer="Done()")
-    assert reason.text == "Arm should give Armed, but gives Done()"
-    assert reason.json()["values"] == {"request": "Arm", "expected": "Armed", "answer": "Done()"}
+@cases
+def test_a_reason_is_said_in_the_words_of_its_scene(scene, code, values, sentence):
+    reason = make_reason(code, VOCABULARIES[scene], **values)
+    assert (reason.text, reason.json()["values"]) == (sentence, values)
