@@ -65,7 +65,7 @@ def predict_incline(protocol: Protocol, incline_deg: float, struck: str) -> Pred
     # Top rods of unlike chains start at unlike heights, and the air holds them back unlike.
     longer = protocol.chains[free].chain.length - protocol.chains[struck].chain.length
     higher, free_kappas = 0.0, air_of(protocol, free)
-    if kappas[:1] != free_kappas[:1]:
+    if kappas != free_kappas:
         from rig.model.drag import fallen  # noqa: PLC0415 - only where there is air
 
         gravity, start = protocol.gravity.value, protocol.initial_speed.value
