@@ -80,10 +80,14 @@ class TimerColumn:
     words: Mapping[str, str] = field(default_factory=dict)
     filled: float = 0.0
 
-    def text(self, cell: str) -> str:
-        """Return what a cell says of this column: of packed inputs, its bit."""
+    def word(self, cell: str) -> str:
+        """Return what a cell says: of packed inputs the bit, of times what their heading says."""
         with suppress(ValueError):
-            return str(int(cell, self.packed[0]) >> self.packed[1] & 1) if self.packed else cell
+            return (
+                str(int(cell, self.packed[0]) >> self.packed[1] & 1)
+                if self.packed
+                else (self.words.get(cell, cell) or self.state)
+            )
         return cell
 
     def __str__(self) -> str:
@@ -116,14 +120,10 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     cells = {n: [text for row in rows if (text := row.cell(n))] for n in range(width)}
     facts = {n: _facts_of_values(texts) for n, texts in cells.items() if texts}
     counts = Counter(itertools.chain(*facts.values()))
-    heading = block.find_heading(width, facts)
-    # What has half of a row's numbers is no heading, but a row of which nothing can be read.
-    broken = [
-        row.line
-        for row in block.headings
-        if row.line > heading.line and kinds_of(row.cell(0))
-        if 2 * sum(vocabulary.is_measured(row.cell(n)) for n in facts) >= len(facts)
-    ]
+    heading = block.find_heading(width)
+    # What begins as a row, and has numbers, is a row of which nothing can be read.
+    below = [row for row in block.headings if row.line > heading.line and not row.is_text]
+    broken = [row.line for row in below if kinds_of(row.cell(0))]
     file.rows += len(broken)
     file.unread += broken
     if 0 < len(heading.texts) < width and "counts" in facts.get(0, ()):
@@ -146,6 +146,10 @@ def columns_of(file: TimerFile, block: RowBlock, rows: Sequence[Row]) -> list[Ti
     above, accepted = heading if heading.texts else rows[0], roles()["setting"][1]
     for column in columns:
         column.filled = len(cells[column.at]) / len(rows)
+        # Falls decide whether a mark before the last three digits parts thousands.
+        if column.power in {6, 9} and all(map(form("thousands").fullmatch, cells[column.at])):
+            file.facts |= {mark := file.choose("decimals", "thousands")}
+            column.power -= 3 * (mark == "thousands")
         if column.role == "setting":
             file.problems.reject(*above.place(column.at), "heading", column.name, accepted)
     file.problems.raise_if_any()

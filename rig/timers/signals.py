@@ -66,10 +66,9 @@ def read_file(file: TimerFile) -> TimerFile:
     file.rows += len(table.strays)
     file.unread += table.strays
     if not len(file.changes):
-        notes = "".join(f"; {note}" for note in file.notes)
-        file.problems.refuse(1, "nothing_passes" if file.rows else "no_edges", notes=notes)
+        code = "nothing_passes" if file.rows else "no_edges"
+        file.problems.refuse(1, code, notes="".join(f"; {note}" for note in file.notes))
     file.notes += [make_reason("last_line_cut")] if is_cut(file.path) else []
-    file.facts |= facts_held({"thousands": table.has_thousands})
     return file
 
 
@@ -177,14 +176,14 @@ class SignalReader:
 
     def _read_value(self, row: Row, tick: int, signal: TimerColumn) -> bool:
         """Keep what a cell says: a sample of volts, or a state if that is a change."""
-        word = signal.text(row.cell(signal.at))
+        word = signal.word(row.cell(signal.at))
         if not (word or self.is_sampled or signal.role == "moment"):
             return False
         key = signal, *self.above.values()
         before, text = self.states.get(key, (None, None))
         if self.is_whole and word == text:  # in nearly all rows of levels
             return True
-        state = meaning_of(signal.role, signal.words.get(word, word) or signal.state)
+        state = meaning_of(signal.role, word)
         if state is None:
             self._reject(row, signal, word)
         elif isinstance(state, float):

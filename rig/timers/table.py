@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
 
+from rig.text_rows import read_rows
 from rig.timers import vocabulary
 from rig.timers.vocabulary import LONGEST, form, is_measured, is_number, kinds_of, roles_in
 
@@ -69,45 +70,36 @@ class RowBlock:
 
     def begin(self, width: int) -> None:
         """Begin its rows: one without a heading as wide as these has that of the block above."""
-        self.width = width
-        if all(len(row.texts) != width for row in self.headings):
+        if not (self.width or any(len(x.texts) == width and x.is_text for x in self.headings)):
             self.headings += self.above
+        self.width = self.width or width
 
-    def begin_below(self, mark: str) -> RowBlock:
+    def begin_below(self, mark: str, *headings: Row) -> RowBlock:
         """Begin the block below a mark; a run or gate goes on until a mark names another."""
         run, gate = (vocabulary.find_label(mark, role) for role in ("run", "gate"))
         above = self.headings if self.width else [*self.above, *self.headings][:_SAMPLE]
         number = self.number + (not run and not gate)
-        return RowBlock(self.remarks, above, number, run or self.run, gate or self.gate)
+        run, gate = run or self.run, gate or self.gate
+        return RowBlock(self.remarks, above, number, run, gate, [*headings])
 
-    def find_heading(self, width: int, filled: Collection[int]) -> Row:
+    def find_heading(self, width: int) -> Row:
         """Return the row with most cells that are known, the lowest of those with most names.
 
-        Above and below may stand symbols, units and settings. A remark may name the columns where
-        nothing else does.
-
-        Parameters
-        ----------
-        filled
-            Columns that have values.
+        Above and below may stand symbols, units and settings.
         """
-        rows = self.headings or [
-            row
-            for row in self.remarks
-            if len(row.texts) == width < 2 * row.count_known()
-            and not form("assignment").search(row.raw)
-        ]
         # Rows may end with a separator.
-        named = [row for row in reversed(rows) if len(row.texts) > width - 2 and row.is_text]
-        ranks = [(row.count_known(filled), len({*row.texts})) for row in named]
-        best = max(ranks, default=(0, 0))
-        return named[ranks.index(best)] if best[0] else Row(0, [])
+        ranks = [
+            (row.count_known(), len({*row.texts}), row.line, row)
+            for row in self.headings or self.remarks
+            if len(row.texts) > width - 2 + (not self.headings) and row.is_text
+        ]
+        return max(ranks)[-1] if any(rank[0] for rank in ranks) else Row(0, [])
 
     def find_time_base(self) -> tuple[float, float]:
         """Return the first sample's time and the step, s, that settings state; 0 without."""
         stated, rows = dict[str, float](), [*self.remarks, *self.headings, Row(0, [])]
         texts = [
-            f"{text} {value}"[:120]
+            f"{text} {value}"[:LONGEST]
             for above, below in itertools.pairwise(rows)
             for n, text in enumerate(above.texts)
             for value in ("", above.cell(n + 1), below.cell(n))
@@ -117,9 +109,7 @@ class RowBlock:
             power = _UNITS.get(unit, _UNITS.get(vocabulary.unit_of(symbol)))
             if power is not None:
                 # What is in hertz is a rate, whatever its name, if no other is.
-                roles = (
-                    roles_in(name) if unit not in _RATES else roles_in(name) - {"step"} | {"hertz"}
-                )
+                roles = roles_in(name) - {"step"} | {"hertz"} if unit in _RATES else roles_in(name)
                 value = float(number.replace(",", ".")) / 10.0**power
                 stated = dict.fromkeys(roles, value) | stated
         rate = stated.get("rate") or stated.get("hertz") or math.inf
@@ -153,25 +143,29 @@ class Row(NamedTuple):
         width = max((b - a for a, b in itertools.pairwise(filled)), default=0)
         return next(filter(None, self.texts[max(0, at + 1 - width) : at + 1][::-1]), "")
 
-    def count_known(self, columns: Collection[int] | None = None) -> int:
-        """Count the cells, of some columns or of all, that say what a column is."""
-        texts = [text for n, text in enumerate(self.texts) if columns is None or n in columns]
-        roles = [{*(roles_in(x) & _ROLES), vocabulary.unit_of(x)} - {""} for x in texts]
-        is_heading = set().union(*roles) - _NO_ROLES and "units" not in roles_in(texts[0])
+    def count_known(self) -> int:
+        """Count the cells that say what a column is."""
+        roles = [{*(roles_in(x) & _ROLES), vocabulary.unit_of(x)} - {""} for x in self.texts]
+        is_heading = set().union(*roles) - _NO_ROLES and "units" not in roles_in(self.texts[0])
         return sum(map(bool, roles)) if is_heading else 0
 
     @property
     def is_text(self) -> bool:
-        """Whether it has no measured numbers, but for those of inputs behind a time."""
+        """Whether it may name columns: without measured numbers but those of inputs behind a time.
+
+        A remark does so with most of its cells, and states nothing.
+        """
+        if vocabulary.is_remark(self.raw) and (
+            len(self.texts) >= 2 * self.count_known() or form("assignment").search(self.raw)
+        ):
+            return False
         is_numbers = form("time and numbers").fullmatch
         return not any(map(is_measured, self.texts)) or is_numbers(self.raw) is not None
 
     @property
     def is_mark(self) -> bool:
         """Whether it says that another run, or gate, begins: ``--- Run 2 ---``."""
-        # Between words, a mark has no values that are named.
-        text = vocabulary.normal(" ".join(self.texts).strip() or self.raw).strip('-=*#:<>[]" ')
-        return form("mark").fullmatch(text) is not None
+        return form("mark").fullmatch(vocabulary.normal(" ".join(self.texts))) is not None
 
     @property
     def is_heading(self) -> bool:
@@ -204,76 +198,56 @@ class Table:
     ----------
     separator
         Of the cells; a blank stands for any number of blanks, nothing for words between values.
-    has_thousands
-        Whether a mark in its numbers parts thousands, though it may be that of decimals.
     strays, words
         Lines among rows that are neither rows nor headings: with a value, or without.
     """
 
     def __init__(self, lines: _Lines, choose: Callable[..., str]) -> None:
         self.strays, self.words = list[int](), list[int]()
-        unwrapped = _split_lists((number, _unwrap(line)) for number, line in lines)
-        sample = list(itertools.islice(unwrapped, _SAMPLE))
-        plain = [line for _, line in sample if line.strip() and not vocabulary.is_remark(line)]
-        self._names, named = _find_names(plain)
-        self._lines: Iterator[tuple[int, str]] = itertools.chain(sample, unwrapped)
-        if self._names:
-            self._lines = _join_fields(self._lines, self._names)
-        self.separator = choose(*find_separators(plain, named))
-        self.has_thousands, self._usual = False, _Shape()
-        shapes = Counter(x for x in map(_shape, map(self.split, plain)) if any(map(all, x)))
+        lines = _split_lists((number, _unwrap(line)) for number, line in lines)
+        head = [*itertools.islice(lines, _SAMPLE)]
+        names, named = _find_names(_plain(head))
+        self.separator = choose(*find_separators(_plain(head), named))
+        self._names = [] if self.separator else [name for name, _ in names]
+        chained = itertools.chain(head, lines)
+        lines = chained if self.separator else _tabulate(chained, names)
+        head = [*itertools.islice(lines, _SAMPLE)]
+        self._lines = (x for x in itertools.chain(head, lines) if x[1].strip(" \t,;|"))
+        self._usual = _Shape()
+        shapes = Counter(x for x in map(_shape, map(self.split, _plain(head))) if any(map(all, x)))
         usual, count = next(iter(shapes.most_common(1)), ((), 0))
         self._usual = usual if 2 * count > max(2, shapes.total()) else ()
-        # Where each fraction has three digits, falls decide whether its mark parts thousands.
-        texts = itertools.chain(*map(self.split, plain))
-        fractions = [text for text in texts if "fraction" in kinds_of(text)]
-        is_open = any(fractions) and all(map(form("thousands").fullmatch, fractions))
-        self.has_thousands = is_open and choose("decimals", "thousands") == "thousands"
 
     def split(self, line: str) -> list[str]:
         """Split a line into cells; numbers get a decimal point, and what is missing is empty."""
-        if not self.separator:
-            values = dict(_named_values(line))
-            if values.keys().isdisjoint(self._names):  # of a line that begins in its middle
-                values = {(name.split(" ")[-1], n): text for (name, n), text in values.items()}
-            # Names that come again are of another row, which may not be lost.
-            again = [x for x in values.keys() - self._names if (x[0], 0) in self._names]
-            return [values.get(x, "") for x in (*self._names, *again)] if values else [line]
-        cells = split_cells(line, self.separator, self._usual)
-        return [_read_cell(text, self.has_thousands) for text in cells]
+        return [*map(_read_cell, split_cells(line, self.separator or "\t", self._usual))]
 
     def rows(self) -> Iterator[Row]:
         """Yield each row of data."""
         block, is_plain = RowBlock(), form("plain row").fullmatch
-        if not self.separator:
-            block.headings.append(Row(1, [name for name, _ in self._names], "", block))
+        block.headings += [Row(1, self._names)] if self._names else []
         for number, line in self._lines:
-            if not line.strip():
-                continue
             if block.width and is_plain(line):  # as most
                 yield Row(number, self.split(line), line, block)
                 continue
             mark = form("remark").match(line[:LONGEST])
             text = line[mark.end() :].rstrip('" ') if mark else line
             row = Row(number, self.split(text), line, block)
-            is_mark = row.is_mark
-            if is_mark or (block.width and not mark and row.is_heading):
-                block = block.begin_below(line if is_mark else "")
-                block.headings += [] if is_mark else [row]
-            elif mark:
-                block.remarks += [row] if number <= _SAMPLE and not block.width else []
-            elif not self.separator and len(row.texts) > len(self._names):
-                self.strays.append(row.line)
-            elif self._is_row(row):
-                if not block.width:
-                    block.begin(len(row.texts))
+            if row.is_mark or (block.width and form("rule").fullmatch(line)):
+                block = block.begin_below(line)
+            elif not mark and self._is_row(row):
+                block.begin(len(row.texts))
                 yield row
-            elif block.width and any(row.texts):
-                (self.strays if any(map(kinds_of, row.texts)) else self.words).append(number)
-            elif any(row.texts):
+            elif mark:
+                block.remarks += [row] * (not block.width and number <= _SAMPLE)
+            elif not block.width:
                 if len(block.headings) > _SAMPLE:
                     return
                 block.headings.append(row)
+            elif row.is_heading:
+                block = block.begin_below("", row)
+            elif any(row.texts):
+                (self.strays if any(map(kinds_of, row.texts)) else self.words).append(number)
 
     def _is_row(self, row: Row) -> bool:
         """Whether it is as most rows, or has values only, and at least a number or a time.
@@ -306,12 +280,10 @@ def split_cells(line: str, separator: str, usual: _Shape = ()) -> list[str]:
 
 
 @lru_cache(10_000)
-def _read_cell(text: str, has_thousands: bool) -> str:
+def _read_cell(text: str) -> str:
     """Return a cell in which a number has a decimal point and no mark of thousands."""
     if text[:5].casefold() in vocabulary.words()["missing"]:
         return ""
-    if has_thousands:
-        text = re.sub("(?<=[0-9])[.,]", "", text)
     if form("grouped").fullmatch(text[:LONGEST]):
         text = form("mark of thousands").sub("", text)
     return text.replace(",", ".") if form("decimal comma").fullmatch(text[:LONGEST]) else text
@@ -319,11 +291,11 @@ def _read_cell(text: str, has_thousands: bool) -> str:
 
 @lru_cache(10_000)
 def _unwrap(line: str) -> str:
-    """Return a line without a remark behind it, and without a monitor's clock before it."""
-    if form("plain row").fullmatch(line):  # as most
-        return line
-    line = form("remark behind").sub("", form("exponent of Fortran").sub("E", line))
-    return form("clock before").sub(r"\1\5 ", line)
+    """Return a line without what `markup.txt` says to be none of its values or names."""
+    if form("marked up").search(line):  # as few are
+        for expression, text in read_rows(__file__, "markup.txt", "=>"):
+            line = form(expression).sub(text, line)
+    return line
 
 
 def _split_lists(lines: _Lines) -> Iterator[tuple[int, str]]:
@@ -340,10 +312,10 @@ def _split_lists(lines: _Lines) -> Iterator[tuple[int, str]]:
         if len(text) > 100 * LONGEST:  # a bracket that nothing closes
             levels.clear()
         for piece in (*form("piece of a list").findall(line), " "):
-            is_part = bool(levels) or piece != " "
+            is_part = piece not in ({";", "; "} if levels else {" "})
             if piece[-1] in "[({":
                 name = text[-LONGEST:].rstrip()
-                is_part = name.endswith((":", "="))
+                is_part = name.endswith((":", "=")) and not form("matrix").match(line)
                 levels.append(is_part and piece == "{")
                 is_part &= not any(vocabulary.find_label(name, x) for x in ("run", "gate"))
             elif piece in {"]", ")", "}"}:
@@ -354,7 +326,6 @@ def _split_lists(lines: _Lines) -> Iterator[tuple[int, str]]:
     yield number, text
 
 
-@lru_cache(1)
 def _named_values(line: str) -> list[tuple[_Name, str]]:
     """Return the values between the words of a line, each with the words right before it."""
     values, end, counts = [], 0, Counter[str]()
@@ -381,20 +352,33 @@ def _find_names(lines: Sequence[str]) -> tuple[list[_Name], int]:
     return [*itertools.chain(*fields)], sum(len(x) * rows[x] for x in fields)
 
 
-def _join_fields(lines: _Lines, names: Collection[_Name]) -> Iterator[tuple[int, str]]:
-    """Make a line of lines that name a value each, until all have come, or one comes again."""
-    record, at = dict[_Name, str](), 0
+def _tabulate(lines: _Lines, names: Collection[_Name]) -> Iterator[tuple[int, str]]:
+    """Make cells of values between words, of a line or of several that have one each.
+
+    A record ends before a name that comes again, or where all have come.
+    """
+    times = Counter(name for name, _ in names)
+    record, at, is_row = dict[_Name, str](), 0, False
     for number, line in itertools.chain(lines, [(0, "")]):
-        name, *others = dict(_named_values(line)) or [("", -1)]
-        is_field = name in names and not others
-        if record and (name in record or len(record) == len(names) or not number):
-            yield at, ", ".join(record.values())
-            record.clear()
-        at = at if record else number
-        if is_field:
-            record[name] = line.strip(" ,")
-        else:
+        values = _named_values(line)
+        if times.keys().isdisjoint(name for (name, _), _ in values):
+            # Of a line that begins in its middle
+            values = [((name.split(" ")[-1], n), text) for (name, n), text in values]
+        cells = [((x, n % times[x]), text) for (x, n), text in values if x in times]
+        for name, text in cells or [(("", -1), "")]:
+            is_other = number != at and (is_row or len(cells) > 1 or not number)
+            if record and (is_other or name in record or len(record) == len(names)):
+                yield at, "\t".join(record.get(x, "") for x in names)
+                record.clear()
+            at, is_row = (at, is_row) if record else (number, len(cells) > 1)
+            record |= {name: text} if cells else {}
+        if not cells and (not values or vocabulary.is_remark(line) or Row(0, [line]).is_mark):
             yield number, line
+
+
+def _plain(lines: _Lines) -> list[str]:
+    """Return lines that are neither empty nor remarks."""
+    return [line for _, line in lines if line.strip() and not vocabulary.is_remark(line)]
 
 
 def find_separators(lines: Sequence[str], named: int) -> list[str]:

@@ -165,14 +165,14 @@ def test_a_flicker_is_no_record_of_drops(tmp_path, monkeypatch, content):
 
 
 def test_of_a_dump_only_changes_of_unlisted_wires_are_refused(tmp_path):
-    """Not numbers in a comment, nor wires of a vector or of a real number, whatever their names."""
+    """Not numbers in a comment, nor real numbers, whatever their names; a vector has inputs."""
     path = tmp_path / "dump.vcd"
     head = (
         "$timescale 1 us $end\n$var wire 1 ! D0 $end\n$var wire 4 1a bus $end\n"
         "$var real 64 0 volts $end\n$enddefinitions $end\n$comment\n100\n$end\n"
     )
     path.write_text(f"{head}#0 0! b0101 1a\nr1.5 0\n#400 1!\n#500 0!\n", "utf-8")
-    assert signals.read_file(TimerFile(path)).changes.size == 3
+    assert signals.read_file(TimerFile(path)).changes.size == 7
     assert faults(tmp_path, f"{head}#0 0!\n#400 1!\n#500 0!\n1a\n") == [(12, 1, "wire")]
 
 
