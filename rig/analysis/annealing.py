@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from rig.analysis.chain_records import ChainRecord
+from rig.analysis.chain_records import MISSED, ChainRecord
 from rig.analysis.components import ALPHA_SD, ANY_ALPHA
 from rig.analysis.departures import LOWEST_START
 from rig.analysis.free_flight import FAINT
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
     from rig.analysis.drop_model import DropModel
     from rig.analysis.trajectory import Trajectory
 
-MISSED = 0.02
-"""Prior probability that an expected edge is missed."""
 STRAYS = 2.0
 """Prior rate of stray edges at a gate, 1/s."""
 NAMES = "release", "drop", "clock", "gravity", "drag", "alpha"
@@ -64,7 +62,7 @@ def count_matched(match: Index) -> int:
     return int(np.count_nonzero(match >= 0))
 
 
-def log_density(off: Array, sigma: Array | float, speed: Array) -> Array:
+def log_density(off: Array, sigma: Array | float, speed: Array, absent: Array) -> Array:
     """Return the log likelihood ratio of each edge as a rod's edge against a stray.
 
     The reference is a reading in which all edges are strays and every rod was missed.
@@ -75,10 +73,12 @@ def log_density(off: Array, sigma: Array | float, speed: Array) -> Array:
         Height between edge and rod's side, and its standard deviation, m.
     speed
         Speed of the rod, m/s.
+    absent
+        Prior probability that the edge does not come.
     """
-    worth = math.log((1.0 - MISSED) / MISSED / STRAYS / math.sqrt(2.0 * math.pi))
+    worth = np.log((1.0 - absent) / absent / STRAYS / math.sqrt(2.0 * math.pi))
     tiny = np.finfo(float).tiny
-    return np.log(np.maximum(speed, tiny) / sigma) - 0.5 * (off / sigma) ** 2 + worth
+    return np.asarray(np.log(np.maximum(speed, tiny) / sigma) - 0.5 * (off / sigma) ** 2 + worth)
 
 
 class Weights(NamedTuple):
@@ -401,7 +401,8 @@ class SideFall:
         sides = np.flatnonzero(edges >= 0)
         sigma = self.sigma[sides]
         off = height[edges[sides]] - self.levels[sides]
-        evidence = float(log_density(off, sigma, speed[edges[sides]]).sum() - lost)
+        absent = self.record.due.absent[sides]
+        evidence = float(log_density(off, sigma, speed[edges[sides]], absent).sum() - lost)
         scatter = math.sqrt(float(((off / sigma) ** 2).sum()) / max(1, sides.size))
         x = self.unknowns(fall)
         x[self.columns[RELEASE]] = fall[RELEASE] * (1.0 + x[self.columns[CLOCK]])

@@ -27,6 +27,12 @@ from rig.protocol.contact import higher_contacts
 from rig.protocol.protocol import Gate, Protocol, RodChain, Run, Side
 from rig.records import Drop
 
+MISSED = 0.02
+"""Prior probability that a gate misses an edge."""
+_HEAP, _STEEP = 0.25, 40.0
+"""Mean height of a heap of rods on a level board, in units of the sum of their thicknesses, and the
+incline above which there is none, °. In resolved falls it is 0.26 at 0 to 5°, 0.12 at 15 to 20° and
+0.03 at 35°."""
 QUICK = 0.3e-3
 """Edges of a gate closer than this are a flicker of the receiver, not two sides of a rod, s."""
 SIDES = 2
@@ -35,9 +41,6 @@ LONGEST = 64
 """Most edges kept of a flicker, to save time: its middle adds no information. A clean edge has 1,
 a rod in front of a receiver that flickers with the mains about ten."""
 
-_ON_RODS = 2.0
-"""`ChainRecord.uneven` on a pile: in resolved falls, α of single impulses scatters by 0.04 there
-and by 0.02 on a board."""
 WIDER = 1.2
 """Factor by which an object's width in a beam may differ from the stated one: if the beam passes
 half a radius off its middle, the chord is 13 % shorter."""
@@ -76,12 +79,21 @@ class DueEdges(NamedTuple):
         Height of the chain's reference point by the nominal geometry, m; falling at each gate.
     gate
         Number of the gate in the protocol's list.
+    absent
+        Prior probability that the edge does not come: the gate misses it, or a heap of rods, of
+        exponentially distributed height, stops the rod before or darkens the beam.
     """
 
     rods: Index
     blocks: Flags
     levels: Array
     gate: Index
+    absent: Array
+
+    @property
+    def blame(self) -> Array:
+        """Probability that the gate has missed the edge if it does not come."""
+        return np.asarray(MISSED / self.absent * (1.0 - self.absent) / (1.0 - MISSED))
 
 
 class DropEdges(NamedTuple):
@@ -151,12 +163,12 @@ class ChainRecord:
         `rig.analysis.trajectory.Trajectory`.
     unlike
         κ of each rod alone less that of its chain, see `unlike`.
-    uneven
-        Scatter of its single impulses relative to that on a bare board.
     incline_deg
         Inclination of the surface that it strikes.
     condition
         Name of the condition; drops under the same condition share the contact unknowns.
+    heap
+        Mean height of the heap on which each rod strikes, m.
     higher
         Height of each rod's middle above the contact point as its impact acts, m; empty for a free
         chain. Results refer to the level: the top rod falls on as if no rod lay there.
@@ -178,9 +190,9 @@ class ChainRecord:
     alpha: float = 0.0
     air: Array = field(default_factory=lambda: ONE)
     unlike: Array = field(default_factory=lambda: np.zeros(1))
-    uneven: float = 1.0
     incline_deg: float = 0.0
     condition: str = ""
+    heap: Array = field(default_factory=lambda: np.zeros(1))
     higher: tuple[float, ...] = ()
     aside: tuple[int, ...] = ()
     thinned: int = 0
@@ -216,6 +228,7 @@ def _due_edges(
     chain: RodChain,
     start: float,
     higher: tuple[float, ...] | None,
+    heap: Array,
     darkening: bool,
 ) -> DueEdges:
     """Return the expected edges of a chain.
@@ -229,6 +242,8 @@ def _due_edges(
     higher
         Height above the contact point at which each rod stops, m: no passage is expected below;
         `None` for a free chain.
+    heap
+        See `ChainRecord.heap`.
     darkening
         Whether the timer records only edges that darken a beam, as some do.
     """
@@ -239,10 +254,15 @@ def _due_edges(
     rods = np.tile(np.repeat(np.arange(places.size), 2), beams.size)
     blocks = np.arange(levels.size) % 2 == 0
     seen = (levels < start) & (blocks | (not darkening))
+    absent = np.full(levels.size, MISSED)
     if higher is not None:
-        seen &= levels > (np.array(higher) - places)[rods]
+        above, high = levels - (np.array(higher) - places)[rods], heap[rods]
+        seen &= above > 0.0
+        # A heap up to a rod's upper side at the beam keeps both its edges from coming.
+        upper, far = np.repeat(above[1::2], 2).clip(0.0), np.full_like(absent, np.inf)
+        absent += (1.0 - 2.0 * MISSED) * np.exp(-np.divide(upper, high, far, where=high > 0.0))
     gate = np.repeat([number for number, _ in gates], 2 * places.size)
-    due = DueEdges(rods[seen], blocks[seen], levels[seen], gate[seen])
+    due = DueEdges(rods[seen], blocks[seen], levels[seen], gate[seen], absent[seen])
     for values in due:  # every drop has the same arrays
         values.flags.writeable = False
     return due
@@ -315,13 +335,13 @@ def _blank_records(
         chain, air = protocol.chains[name], np.array(shares[name])
         impacts = {} if role == "free" else _impacts(protocol, run, chain)
         used = [(n, gate) for n, gate in gates if n not in aside]
-        start, stops = protocol.drop.value, impacts.get("higher")
+        start, stops, heap = protocol.drop.value, impacts.get("higher"), impacts.get("heap", ONE)
         records.append(
             ChainRecord(
                 role,
                 chain,
                 DropEdges.of((), 1.0).edges,
-                _due_edges(used, chain, start, stops, darkening),
+                _due_edges(used, chain, start, stops, heap, darkening),
                 # No rod falls after the last leg, but later edges need a leg too.
                 air=np.append(air, air[-1]) if impacts and np.ptp(air) else air[:1],
                 unlike=unlike(chain.chain, shares[name]),
@@ -338,15 +358,20 @@ def _impacts(protocol: Protocol, run: Run, chain: RodChain) -> dict[str, Any]:
     assert protocol.surface is not None
     # γ does not depend on the incline, and 0° is always in the domain of Eq. 13.
     gamma = impact_on(protocol.surface, chain.chain, 0.0).gamma
-    alpha, uneven = 0.0, 1.0
+    alpha = 0.0
     with suppress(DomainError):
-        impact = impact_on(protocol.surface, chain.chain, run.incline_deg)
-        alpha, uneven = impact.alpha, _ON_RODS if impact.basis == "pile" else 1.0
+        alpha = impact_on(protocol.surface, chain.chain, run.incline_deg).alpha
     return {
         "ratios": np.array(kicks(chain.chain, [1.0] * chain.chain.rods, gamma)),
         "alpha": alpha,
-        "uneven": uneven,
         "incline_deg": run.incline_deg,
         "condition": str(protocol.condition(run)),
+        "heap": _heap(chain, run.incline_deg),
         "higher": higher_contacts(protocol, run.incline_deg, chain),
     }
+
+
+def _heap(chain: RodChain, incline_deg: float) -> Array:
+    """Return the mean height of the heap on which each rod strikes, m; 0 without thicknesses."""
+    thick = np.array(chain.diameters or [0.0] * chain.chain.rods)
+    return np.asarray(_HEAP * max(0.0, 1.0 - incline_deg / _STEEP) * (np.cumsum(thick) - thick))

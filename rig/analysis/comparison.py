@@ -176,8 +176,7 @@ def _covariance(lines: Sequence[_Line]) -> Array:
     # Widen a scale with few degrees of freedom to its expanded uncertainty.
     factor *= (coverage_factor(degrees) / coverage_factor(math.inf)) ** 2
     gains, losses = np.array(plus), np.array(minus)
-    covariance: Array = np.diag(factor * np.array(own)) + gains @ gains.T - losses @ losses.T
-    return covariance
+    return np.asarray(np.diag(factor * np.array(own)) + gains @ gains.T - losses @ losses.T)
 
 
 def _by_size(deviation: Deviation) -> Deviation:

@@ -90,7 +90,7 @@ class Components:
         """
         return (loose > 0.0) * self.departure**2 + (self.few * loose) ** 2
 
-    def impulses(self, alpha: float, above: Array, uneven: float = 1.0) -> Array:
+    def impulses(self, alpha: float, above: Array) -> Array:
         """Return the standard deviation of each impulse's α, for a mean α.
 
         No impulse scatters by more than the range of α.
@@ -99,10 +99,8 @@ class Components:
         ----------
         above
             Number of rods above the striking rod; shape ``(rods,)``.
-        uneven
-            See `rig.analysis.chain_records.ChainRecord.uneven`.
         """
-        even = math.hypot(self.impulse * alpha * uneven, self.impulse_floor)
+        even = math.hypot(self.impulse * alpha, self.impulse_floor)
         return np.minimum(np.hypot(even, self.bounce * alpha / above), ALPHA_SD)
 
 

@@ -150,8 +150,7 @@ def lags(record: ChainRecord, drop: float, rods: Index, levels: Array) -> Array:
         m, shape ``(moments,)``.
     """
     way = np.maximum(drop - levels, 0.0)
-    behind: Array = record.unlike.take(rods, mode="wrap") * way**2 / 3.0
-    return behind
+    return np.asarray(record.unlike.take(rods, mode="wrap") * way**2 / 3.0)
 
 
 def slack(record: ChainRecord, drop: float, rods: Index, levels: Array) -> Array:
@@ -169,8 +168,7 @@ def slack(record: ChainRecord, drop: float, rods: Index, levels: Array) -> Array
     """
     way = np.maximum(drop - levels, 0.0)
     taut = -np.expm1(-((way / SLACK_WAY) ** 2))
-    own: Array = np.eye(record.chain.chain.rods)[rods] * taut[:, None]
-    return own
+    return np.asarray(np.eye(record.chain.chain.rods)[rods] * taut[:, None])
 
 
 @lru_cache(maxsize=64)  # a session needs the same two for every drop

@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rig.analysis.annealing import LEAST, MISSED
-from rig.analysis.chain_records import SIDES, ChainRecord
+from rig.analysis.annealing import LEAST
+from rig.analysis.chain_records import MISSED, SIDES, ChainRecord
 from rig.analysis.distributions import most_by_chance
 from rig.analysis.equations import STRAY, standardise
 from rig.analysis.faults import Suspects, gate_values
 from rig.analysis.fit import Fit, Matches
-from rig.arrays import Flags, Index
+from rig.arrays import Array, Flags, Index
 from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, make_reason
 
@@ -43,6 +43,7 @@ class GateCount(NamedTuple):
     seen: Flags
     came: int
     after: int
+    absent: Array
 
     @property
     def missing(self) -> int:
@@ -52,7 +53,7 @@ class GateCount(NamedTuple):
     @property
     def share(self) -> float:
         """Matched share of its expected edges."""
-        return 1.0 - self.missing / self.seen.size
+        return float(np.sum(self.absent[self.seen]) / np.sum(self.absent))
 
     @property
     def surplus(self) -> int:
@@ -89,7 +90,9 @@ def gate_counts(records: Iterable[ChainRecord], matches: Matches | None = None) 
             match = first if matches is None else matches[record.role][here]
             after = int(np.count_nonzero(came > match.max()))
             rods, seen = due.rods[here], match >= 0
-            counts.append(GateCount(record.role, gate, rods, seen, came.size, after))
+            counts.append(
+                GateCount(record.role, gate, rods, seen, came.size, after, due.blame[here])
+            )
     return counts
 
 
@@ -139,11 +142,11 @@ def suspects(records: Collection[ChainRecord], matches: Matches | None = None) -
     lacking = [gate for gate in counts if gate.lacks_end]
     absent, more = {}, any(_are_crossed(*pair) for pair in product(lacking, crowded))
     more |= sum(gate.lacks_end for gate in crowded) > 1
-    for record in records if matches else ():
-        if gates := [gate for gate in counts if gate.role == record.role]:
-            due = {rod for gate in gates for rod in gate.rods.tolist()}
-            seen = {rod for gate in gates for rod in gate.rods[gate.seen].tolist()}
-            absent[record.chain.name] = sorted(due - seen)
+    for record in records:
+        gates = [gate for gate in counts if gate.role == record.role]
+        if matches and gates:
+            due, match = record.due.rods, matches[record.role]
+            absent[record.chain.name] = np.setdiff1d(due, due[match >= 0]).tolist()
             more |= min(gate.after for gate in gates) >= SIDES
     return Suspects([gate.gate for gate in worst], absent, more)
 

@@ -11,7 +11,7 @@ from rig.analysis.budgets import Budgets
 from rig.analysis.chain_records import ChainRecord, chain_records
 from rig.analysis.diagnoses import gates_too_low, silent, suspects
 from rig.analysis.drop_model import DropModel
-from rig.analysis.edge_classes import count_unexplained, unmatched_edges
+from rig.analysis.edge_classes import unmatched_edges
 from rig.analysis.explanations import Explainer
 from rig.analysis.faults import Premise, Suspects
 from rig.analysis.fit import Begun, DropFit, Fit, settle
@@ -218,7 +218,7 @@ class DropCase:
                 reasons = (*reasons, *(reading.explained or ()))
             return DropResult(run, drop.attempt, verdict, reasons, audit), None
         unmatched = unmatched_edges(fit)
-        audit = audit.count(fit.match_count, count_unexplained(unmatched))
+        audit = audit.count(fit.match_count, unmatched)
         joint = by_itself(fit)
         budgets = Budgets(joint)
         measured = budgets.measure_all(joint.drops[0])

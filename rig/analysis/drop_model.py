@@ -170,8 +170,7 @@ class DropModel:
 
     def rate(self, x: Array) -> Array:
         """Return the factor from stamped times to true times, shape ``(1,)`` or ``(drops, 1)``."""
-        rates: Array = 1.0 + (x @ self.unknowns.rate)[..., None]
-        return rates
+        return np.asarray(1.0 + (x @ self.unknowns.rate)[..., None])
 
     def kappa(self, x: Array) -> float:
         """Return κ of the first chain as a whole, 1/m."""
@@ -211,8 +210,7 @@ class DropModel:
 
     def all_levels(self, role: str, x: Array) -> Array:
         """Return the height of the reference point at every expected edge of a side, m."""
-        levels: Array = self.expected[role].levels + x @ self.slopes[role].levels.T
-        return levels
+        return np.asarray(self.expected[role].levels + x @ self.slopes[role].levels.T)
 
     def _matched_edges(self, role: str, match: Seen | Index) -> Seen:
         """Collect the matched edges; cached, as a matching lasts for many steps of a fit."""

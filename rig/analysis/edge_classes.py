@@ -6,13 +6,13 @@ a rebounding rod, a later passage of the object, or unexplained.
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
-from rig.analysis.annealing import MISSED, STRAYS
+from rig.analysis.annealing import STRAYS
 from rig.analysis.chain_records import QUICK, WIDER, ChainRecord
 from rig.analysis.fit import Fit
 from rig.analysis.joint_step import JointDrop
@@ -29,11 +29,10 @@ EdgeClass = Literal[
     "string",
     "bounce",
     "later passage",
+    "struck",
     "left out",
     "extra",
 ]
-ABSENT = -math.log(MISSED)
-"""Cost of a missed edge: −ln of its prior probability."""
 SURPLUS = -math.log(STRAYS * QUICK)
 """Cost of a stray edge: −ln of its prior probability within the time of a flicker."""
 UNEXPLAINED: EdgeClass = "extra"
@@ -47,7 +46,8 @@ class UnmatchedEdge:
     Attributes
     ----------
     kind
-        ``missed``: no edge of the rod; ``merged``: its shadow overlaps a neighbour's; ``dead
+        ``missed``: no edge of the rod; ``struck``: rather, it has struck before, on a heap, or rods
+        that lie there darken the beam; ``merged``: its shadow overlaps a neighbour's; ``dead
         gate``: the gate gave no edges. ``chatter``: flicker about a rod's edge; ``string``: flicker
         between rods; ``bounce``: shadow in the lowest beam after a rod has struck; ``later
         passage``: the object came back, and perhaps fell again; ``left out``: edge of a gate that
@@ -63,7 +63,7 @@ class UnmatchedEdge:
     edge
         Its number in the drop; `None` for an edge that was not observed.
     cost
-        Cost in the log likelihood: `ABSENT` or `SURPLUS`; 0 if the gate is left out.
+        Cost in the log likelihood: −ln of its prior probability; 0 if the gate is left out.
     """
 
     kind: EdgeClass
@@ -99,11 +99,6 @@ def unmatched_edges(drop: Fit | JointDrop) -> tuple[UnmatchedEdge, ...]:
     return tuple(sorted(unmatched, key=lambda edge: edge.time_s))
 
 
-def count_unexplained(unmatched: Iterable[UnmatchedEdge]) -> int:
-    """Return the number of unexplained edges."""
-    return sum(edge.kind == UNEXPLAINED for edge in unmatched)
-
-
 def _absent(
     protocol: Protocol, record: ChainRecord, match: Index, due: Array
 ) -> Iterator[UnmatchedEdge]:
@@ -111,13 +106,14 @@ def _absent(
 
     If a rod is missed the beam stays bright; if a gap between rods is missed it stays dark.
     """
-    edges, (rods, blocks, _, gates) = record.edges, record.due
+    edges, (rods, blocks, _, gates, absent), blame = record.edges, record.due, record.due.blame
     for at in np.flatnonzero(match < 0).tolist():
         before = edges.blocked[(edges.gate == gates[at]) & (edges.times < due[at])]
         seen: EdgeClass = "missed" if gates[at] in edges.gate else "dead gate"
         kind = "merged" if before[-1:].any() else seen
         channel, when = protocol.gates.gates[gates[at]].channel, float(due[at])
-        yield UnmatchedEdge(kind, channel, when, bool(blocks[at]), int(rods[at]), None, ABSENT)
+        kind, cost = kind if blame[at] > 0.5 else "struck", -math.log(absent[at])
+        yield UnmatchedEdge(kind, channel, when, bool(blocks[at]), int(rods[at]), None, cost)
 
 
 def _surplus(

@@ -115,6 +115,8 @@ class ExpectedEdges(NamedTuple):
         Whether the top rod falls alone, all rods below having struck.
     landed
         Standard deviation of its rod's height from a possible earlier strike, m.
+    alike
+        The same without a heap. Further off, an edge may be that of another rod.
     """
 
     rods: Index
@@ -125,16 +127,20 @@ class ExpectedEdges(NamedTuple):
     drawn: Array
     alone: Flags
     landed: Array
+    alike: Array
 
     @classmethod
     def of(cls, record: ChainRecord, protocol: Protocol) -> ExpectedEdges:
         """Return the expected edges of a side at all its gates."""
-        (rods, blocks, levels, gate), strikes = record.due, record.strikes
-        alone, landed = np.zeros(rods.size, dtype=np.bool_), np.zeros(rods.size)
+        (rods, blocks, levels, gate, _), strikes = record.due, record.strikes
+        alone, alike = np.zeros(rods.size, dtype=np.bool_), np.zeros(rods.size)
+        landed = alike
         if record.ratios is not None and strikes.size > 1:
             alone = (rods == strikes.size - 1) & (levels < -strikes[-2])
             to_strike = levels + strikes[rods] - protocol.contact.strike.value
-            landed = _landing_sd(strike_u(record, protocol)[rods], to_strike)
+            u = strike_u(record, protocol)
+            both = np.stack([u, np.hypot(u, 2.0 * record.heap)])
+            alike, landed = _landing_sd(both[:, rods], to_strike)
         return cls(
             rods,
             gate,
@@ -144,6 +150,7 @@ class ExpectedEdges(NamedTuple):
             drawn(lever(record.chain.chain)[rods], protocol, levels),
             alone,
             landed,
+            alike,
         )
 
     def seen(self, pick: Index, times: Array, burst: Array) -> Seen:
@@ -175,8 +182,7 @@ def robust_weights(residuals: Array, cut: float = math.inf) -> Array:
         Standard deviations beyond which the weight is 0.
     """
     far = np.abs(residuals)
-    weights: Array = np.where(far > cut, 0.0, HUBER / np.maximum(far, HUBER))
-    return weights
+    return np.asarray(np.where(far > cut, 0.0, HUBER / np.maximum(far, HUBER)))
 
 
 def standardise(x: Array, sd: Array) -> Array:

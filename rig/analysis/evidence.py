@@ -101,8 +101,7 @@ class Evidence:
             squares = (y[:, block] * at.sd[block]) ** 2
             record, size = model.records["impact"], np.full(squares.shape, alpha**2)
             single = size / above(record.chain.chain) ** 2
-            even = size * record.uneven**2
-            rows = [even, np.ones_like(size), single, squares, np.zeros_like(size), told[:, block]]
+            rows = [size, np.ones_like(size), single, squares, np.zeros_like(size), told[:, block]]
             self._members.setdefault(_IMPULSES, []).append(np.stack(rows).reshape(len(rows), -1))
 
     def edges(self, residuals: Iterable[Residuals]) -> None:

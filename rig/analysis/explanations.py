@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from rig.analysis.annealing import LEAST, MISSED, PEAKS, Pairing
+from rig.analysis.annealing import LEAST, PEAKS, Pairing
 from rig.analysis.chain_records import ChainRecord, chain_records, thin
 from rig.analysis.faults import Fault, Premise, Suspects, faults
 from rig.analysis.fit import Fit, settle
@@ -183,7 +183,7 @@ class Explainer:
     def _read_alone(self, record: ChainRecord) -> float:
         """Return the evidence of a side by itself, for a drop that was not identified."""
         reading = self._read(self.stated.protocol, [record])
-        none = record.edge_count * math.log(MISSED)
+        none = float(np.sum(np.log(record.due.absent)))
         return none if reading is None else self._evidence(reading, self.stated.hz)
 
     def _read(self, protocol: Protocol, records: Sequence[ChainRecord]) -> Fit | None:
@@ -234,11 +234,13 @@ class Explainer:
         """
         records, matches = fit.model.records.values(), fit.matches
         ticks = len(self._thinned.edges) * math.log(self.stated.hz / hz)
-        missed = 0
+        missed = 0.0
         for record in records:
-            rods = record.due.gate * record.chain.chain.rods + record.due.rods
-            missed += rods.size - np.setdiff1d(rods, rods[matches[record.role] >= 0]).size
-        return fit.evidence + ticks + missed * math.log(MISSED)
+            due, seen = record.due, matches[record.role] >= 0
+            rods = due.gate * record.chain.chain.rods + due.rods
+            hidden = due.blocks & ~np.isin(rods, rods[seen])
+            missed += float(np.log(due.absent[hidden]).sum())
+        return fit.evidence + ticks + missed
 
     def _records(self, premise: Premise) -> list[ChainRecord]:
         return chain_records(

@@ -278,7 +278,9 @@ def _brakes(side: str) -> Iterator[Fault]:
 def _rig_faults(stated: Premise) -> Iterator[Fault]:
     """Yield the faults of everything that both chains share."""
     yield _continuous("drop_height", _hang_higher, 60e-3, 10e-3)
-    yield _continuous("clock", _slow_clock, 0.05, 0.01, "share")
+    yield _continuous(
+        "clock", lambda at, share: at._replace(hz=at.hz * (1.0 - share)), 0.05, 0.01, "share"
+    )
     if stated.protocol.drag is not None:
         yield Fault("air", lambda premise, _: premise.change(drag=None), size="kappa")
     if stated.protocol.surface is not None:
@@ -303,10 +305,6 @@ def _hang_higher(premise: Premise, size: float) -> Premise:
     return premise.change(drop=replace(drop, value=drop.value + size))
 
 
-def _slow_clock(premise: Premise, share: float) -> Premise:
-    return premise._replace(hz=premise.hz * (1.0 - share))
-
-
 def _add_gravity(premise: Premise, share: float) -> Premise:
     gravity = premise.protocol.gravity
     return premise.change(gravity=replace(gravity, value=gravity.value * (1.0 + share)))
@@ -316,10 +314,9 @@ def _raised(code: str, numbers: Collection[int], **where: Any) -> Fault:
     """Return the fault of some gates, by number, that are higher or lower."""
 
     def change(premise: Premise, size: float) -> Premise:
-        gates = [*premise.gates]
-        for n in numbers:
-            gates[n] = replace(gates[n], height=gates[n].height + size)
-        return premise.with_gates(gates)
+        higher = [replace(gate, height=gate.height + size) for gate in premise.gates]
+        every = zip(premise.gates, higher, strict=True)
+        return premise.with_gates([pair[n in numbers] for n, pair in enumerate(every)])
 
     return _continuous(code, change, 40e-3, 10e-3, **where)
 

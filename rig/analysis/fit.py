@@ -93,7 +93,9 @@ class Fit(DropFit):
             rows = model.decorrelate(role, model.residuals(role, self.x, match), match)
             sigma = rows.sigma * estimate.scatter
             beyond = np.maximum(np.abs(rows.values) / sigma - HUBER, 0.0)
-            total += float(np.sum(log_density(rows.values, sigma, rows.speed) + 0.5 * beyond**2))
+            absent = model.records[role].due.absent[match >= 0]
+            density = log_density(rows.values, sigma, rows.speed, absent)
+            total += float(np.sum(density + 0.5 * beyond**2))
         y = model.unknowns.pull(self.x)
         total -= 0.5 * float(y @ y) + float(np.linalg.slogdet(estimate.root)[1])
         return total if math.isfinite(total) else -math.inf
@@ -150,7 +152,7 @@ def match(model: DropModel, x: Array) -> Matches:
     for role, pairing in model.pairings.items():
         times = model.records[role].edges.times * model.rate(x)
         heights, speeds = model.trajectory(role, x).heights(times)
-        landed = model.components.landed * model.expected[role].landed
+        landed = model.components.landed * model.expected[role].alike
         sd = np.hypot(_FINE, np.minimum(landed, model.records[role].pitch / PART))
         matches[role] = pairing.match(model.all_levels(role, x), heights, speeds, sd)
     return matches

@@ -69,8 +69,7 @@ def fall_slopes(
 
 def reach_of(distance: Array, kappa: float | Array) -> Array:
     """Return (1 − e^(−2κd))/κ, which is twice the distance d without drag."""
-    reach: Array = -np.expm1(-2.0 * kappa * distance) / kappa
-    return reach
+    return np.asarray(-np.expm1(-2.0 * kappa * distance) / kappa)
 
 
 def reach_slopes(distance: Array, reach: Array, kappa: float | Array) -> Array:

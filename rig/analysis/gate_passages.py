@@ -77,5 +77,5 @@ def moment(drop: AdjustedDrop, gate: Gate) -> tuple[Dual, Dual]:
     level -= drop.linear("free rods", np.ones((1, 1)))
     speed = drop.squares("free", level).root()
     times = model.trajectory("free", drop.x).times(level.value)
-    late = drop.levels("free", Dual(times, np.zeros_like(level.slopes))) - level
-    return (Dual(times, np.zeros_like(level.slopes)) + late / speed)[0], speed[0]
+    reached = Dual(times, np.zeros_like(level.slopes))
+    return (reached + (drop.levels("free", reached) - level) / speed)[0], speed[0]

@@ -17,7 +17,6 @@ import numpy as np
 from rig.analysis.annealing import (
     ALPHA,
     LEAST,
-    MISSED,
     NAMES,
     PEAKS,
     START,
@@ -25,14 +24,14 @@ from rig.analysis.annealing import (
     SideFall,
     count_matched,
 )
-from rig.analysis.chain_records import SIDES, ChainRecord
+from rig.analysis.chain_records import MISSED, SIDES, ChainRecord
 from rig.analysis.distributions import BY_CHANCE
 from rig.analysis.drop_model import DropModel
 from rig.analysis.equations import STRAY
 from rig.analysis.fit import Begun, DropFit, Fit, Matches, settle, simultaneous
 from rig.arrays import Array
 from rig.clock.calibration import TimeScale
-from rig.protocol.gates import CLEARANCE_M
+from rig.protocol.gates import blocking_rod, hanging_rods
 from rig.protocol.protocol import Protocol
 from rig.reasons import Reason, make_reason
 from rig.vocabulary import ANY_SCENE, Vocabulary
@@ -264,25 +263,21 @@ def deciding_gate(likelier: DropFit, rival: DropFit) -> tuple[str, float]:
         Side, and height above the zero of the protocol's heights, m. No hanging rod blocks the
         beam.
     """
-    best = ("", 0.0, -1.0)
+    apart: dict[tuple[str, float], float] = {}
     protocol = likelier.model.protocol
     zero = 0.0 if protocol.stated is None else protocol.stated.drop.value - protocol.drop.value
     for role, record in likelier.model.records.items():
         paths = [fit.model.trajectory(role, fit.x) for fit in (likelier, rival)]
-        places, drop = np.array(record.chain.chain.heights), protocol.drop
-        start, blocked = drop.value, np.array(record.chain.widths) / 2.0 + max(CLEARANCE_M, drop.u)
-        for height in np.arange(4e-3, start + float(places.max()), 4e-3).tolist():
-            if np.any(np.abs(start + places - height) < blocked):
-                continue
+        places = np.array(record.chain.chain.heights)
+        hanging = hanging_rods([record.chain], protocol.drop)
+        start = min(float(path.height[0]) for path in paths)
+        end = -math.inf if record.ratios is None else -places.max()
+        for height in np.arange(4e-3, protocol.drop.value + places.max(), 4e-3).tolist():
             levels = np.sort(height - places)[::-1]
-            levels = levels[levels < min(float(path.height[0]) for path in paths)]
-            if record.ratios is not None:
-                levels = levels[levels > -places.max()]
-            if levels.size == 0:
-                continue
-            times, rival_times = (path.times(levels) for path in paths)
-            apart = np.abs(times[:, None] - rival_times).min(axis=1)
-            mean = float(np.mean(apart * paths[0].heights(times)[1]))
-            if mean > best[2]:
-                best = role, height, mean
-    return best[0], best[1] + zero
+            levels = levels[(end < levels) & (levels < start)]
+            if levels.size and not blocking_rod(hanging, height):
+                times, rival_times = (path.times(levels) for path in paths)
+                nearest = np.abs(times[:, None] - rival_times).min(axis=1)
+                apart[role, height] = float(np.mean(nearest * paths[0].heights(times)[1]))
+    role, height = max(apart, key=apart.__getitem__, default=("", 0.0))
+    return role, height + zero

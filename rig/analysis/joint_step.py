@@ -5,9 +5,11 @@ Drops of a condition differ only in their edges, so that they are fitted as arra
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import lru_cache
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +31,7 @@ from rig.analysis.square_root import (
 from rig.analysis.unknowns import SharedUnknowns, Unknown
 from rig.arrays import Array, Index
 
+_NONE = np.zeros(0)
 _AT_ONCE = 1_000_000
 """Derivatives of edges in an array: 8 MB. More are no quicker."""
 
@@ -87,8 +90,7 @@ def _eliminate(
     return eliminate(rows, model.unknowns.sd, model.unknowns.pull(x), at.own, at.common)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class DropGroup:
+class DropGroup(NamedTuple):
     """Drops of a joint fit that differ only in their edges.
 
     Attributes
@@ -121,16 +123,16 @@ class DropGroup:
     edges: Mapping[str, Seen]
     x: Array
     places: Places
-    best: Array = field(default_factory=lambda: np.zeros(0))
-    gain: Array = field(default_factory=lambda: np.zeros(0))
-    variances: Array = field(default_factory=lambda: np.zeros(0))
-    blocks: Mapping[str, Array] = field(default_factory=dict)
+    best: Array = _NONE
+    gain: Array = _NONE
+    variances: Array = _NONE
+    blocks: Mapping[str, Array] = MappingProxyType({})
 
     def at(self, shared: Array) -> DropGroup:
         """Return the drops with other values of the session's shared unknowns."""
         x = self.x.copy()
         x[:, self.places.common] = shared[self.places.here]
-        return replace(self, x=x)
+        return self._replace(x=x)
 
     def move(self, shared: Array, step: Array, share: float) -> DropGroup:
         """Return the drops after a share of a step to `shared`, in units of prior uncertainties."""
@@ -154,7 +156,7 @@ class DropGroup:
                 blocks[name] = inverse[:, inside] @ np.swapaxes(inverse[:, inside], 1, 2)
         rows = EquationRows(rest.slopes.reshape(-1, here.size), rest.left.ravel(), here)
         variances, gain = np.sum(inverse**2, axis=-1), gain.astype(np.float32)
-        return replace(self, best=best, gain=gain, variances=variances, blocks=blocks), rows
+        return self._replace(best=best, gain=gain, variances=variances, blocks=blocks), rows
 
     def told(self, inverse: Array) -> tuple[Array, dict[str, Array]]:
         """Return `variances` and `blocks` with shares of the shared unknowns, of R⁻¹ `inverse`."""
@@ -215,18 +217,16 @@ def group_drops(fits: Sequence[DropFit]) -> tuple[SharedUnknowns, list[DropGroup
 
 def with_priors(groups: Sequence[DropGroup], components: Components) -> list[DropGroup]:
     """Return drops with other priors; those of impulses are relative to a condition's mean α."""
-    alphas: dict[object, list[Array]] = {}
+    alphas = defaultdict[object, list[Array]](list)
     for group in groups:
         if "impact" in group.model.records:
-            places = group.model.unknowns["alpha"]
-            alphas.setdefault(group.model.condition, []).append(group.x[:, places])
+            alphas[group.model.condition].append(group.x[:, group.model.unknowns["alpha"]])
     mean = {condition: float(np.concatenate(each).mean()) for condition, each in alphas.items()}
-    changed = []
-    for group in groups:
-        alpha = mean.get(group.model.condition, 0.0)
-        model = group.model.copy_with(components=components, alpha=alpha)
-        changed.append(replace(group, model=model))
-    return changed
+    models = [
+        group.model.copy_with(components=components, alpha=mean.get(group.model.condition, 0.0))
+        for group in groups
+    ]
+    return [group._replace(model=model) for group, model in zip(groups, models, strict=True)]
 
 
 def _edges(model: DropModel, drops: Sequence[DropFit]) -> dict[str, Seen]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -49,6 +49,11 @@ class AdjustedDrop:
     def strikes(self) -> bool:
         """Whether a chain strikes anything."""
         return "impact" in self.model.records
+
+    @property
+    def on_track(self) -> bool:
+        """Whether an object slides down a track."""
+        return self.model.protocol.track is not None
 
     @property
     def both(self) -> bool:
@@ -176,12 +181,6 @@ class AdjustedDrop:
         return self.top("free", self.levels("free", moment))[0]
 
 
-def _acceleration(drop: AdjustedDrop, *, track: bool) -> Dual | None:
-    """Return the acceleration of a free fall or down a track; `None` for other scenes."""
-    down = drop.model.protocol.track is not None
-    return drop.gravity if down == track and not drop.strikes else None
-
-
 COMPUTED: dict[str, Callable[[AdjustedDrop], Dual | None]] = {
     # The free chain is read after the same time since its own release as the striking chain. No
     # model of its later fall is needed.
@@ -198,7 +197,7 @@ COMPUTED: dict[str, Callable[[AdjustedDrop], Dual | None]] = {
     "fall_time_s": lambda drop: (
         drop.arrival.when - drop.release("impact") if drop.strikes else None
     ),
-    "gravity_m_s2": partial(_acceleration, track=False),
-    "acceleration_m_s2": partial(_acceleration, track=True),
+    "gravity_m_s2": lambda drop: None if drop.strikes or drop.on_track else drop.gravity,
+    "acceleration_m_s2": lambda drop: drop.gravity if drop.on_track else None,
 }
 """Function for each row of `rig.measurands`; it returns `None` if the scene lacks the measurand."""

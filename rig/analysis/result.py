@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -131,7 +131,7 @@ class Audit(Record):
     matched
         Received edges that belong to a rod.
     missed
-        Expected edges that were not received.
+        Expected edges that were not received, but for those of rods that may have struck before.
     spurious
         Received edges that belong to no rod.
     lost
@@ -140,9 +140,11 @@ class Audit(Record):
         Spurious edges of no known kind.
     thinned
         Spurious edges in the middle of long flickers, which the fit did not use.
+    struck
+        Edges that were not received as their rods rather struck before, on a heap.
     """
 
-    MEMBERS = "received matched missed spurious lost thinned?"
+    MEMBERS = "received matched missed spurious lost thinned? struck?"
 
     received: int = 0
     matched: int = 0
@@ -151,17 +153,25 @@ class Audit(Record):
     lost: int = 0
     unexplained: int = 0
     thinned: int = 0
+    struck: int = 0
 
     @property
     def edge_count(self) -> int:
         """Edges that a perfect rig would report."""
         return self.matched + self.missed
 
-    def count(self, matched: int, unexplained: int) -> Audit:
-        """Return the counts for other numbers of matched and unexplained edges."""
-        missed, spurious = self.edge_count - matched, self.received - matched
-        changes = {"matched": matched, "missed": missed, "spurious": spurious}
-        return replace(self, **changes, unexplained=unexplained)
+    def count(self, matched: int, unmatched: Collection[UnmatchedEdge]) -> Audit:
+        """Return the counts for a number of matched edges, and all unmatched ones."""
+        kinds = [edge.kind for edge in unmatched]
+        absent, struck = sum(edge.edge is None for edge in unmatched), kinds.count("struck")
+        return replace(
+            self,
+            matched=matched,
+            missed=absent - struck,
+            spurious=self.received - matched,
+            unexplained=kinds.count("extra"),
+            struck=struck,
+        )
 
 
 @dataclass(frozen=True, slots=True)

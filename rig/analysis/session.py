@@ -10,7 +10,7 @@ from typing import Protocol as Interface
 
 from rig.analysis.budgets import Budgets
 from rig.analysis.drop import DropCase, DropSummary
-from rig.analysis.edge_classes import count_unexplained, unmatched_edges
+from rig.analysis.edge_classes import unmatched_edges
 from rig.analysis.fit import DropFit, Fit, alone
 from rig.analysis.identify import FAIR
 from rig.analysis.joint_fit import FEWEST, JointFit, RigEstimate, joint_fit
@@ -94,17 +94,11 @@ class Analysis(Record):
         return sorted((*self.runs, *self.superseded), key=attrgetter("job"))
 
     @property
-    def damaged(self) -> tuple[DropResult, ...]:
-        """Drops whose stored record is damaged."""
-        return tuple(drop for drop in self.drops if drop.damaged)
-
-    @property
     def damage(self) -> list[str]:
         """A line that counts and names the damaged drops; empty if there are none."""
-        names = "; ".join(str(drop.job) for drop in self.damaged)
-        count = f"{len(self.damaged)} of {len(self.drops)} drops"
-        line = f"damaged records, left out: {count} ({names}); see rig recover SESSION"
-        return [line] if names else []
+        names = [str(drop.job) for drop in self.drops if drop.damaged]
+        count = f"{len(names)} of {len(self.drops)} drops ({'; '.join(names)})"
+        return [f"damaged records, left out: {count}; see rig recover SESSION"] if names else []
 
     @property
     def failure(self) -> dict[str, bool]:
@@ -337,7 +331,7 @@ def _joint_result(result: DropResult, drop: JointDrop, budgets: Budgets) -> Drop
         result,
         verdict=verdict_of(reasons),
         reasons=tuple(reasons),
-        audit=result.audit.count(drop.match_count, count_unexplained(unmatched)),
+        audit=result.audit.count(drop.match_count, unmatched),
         quantities=measured,
         gates=budgets.gates(drop),
         rods=drop.rods_of(len(result.rods)),

@@ -115,8 +115,11 @@ def _incline(
     compared: Iterable[Comparison],
 ) -> Incline:
     run = results[0].run
-    names = [row.name for row in averaged() if row.name in results[0].quantities]
-    values = {name: [result.quantities[name] for result in results] for name in names}
+    values = {
+        row.name: [result.quantities[row.name] for result in results]
+        for row in averaged()
+        if row.name in results[0].quantities
+    }
     differences = {
         comparison.quantity: line
         for comparison in compared
@@ -128,7 +131,7 @@ def _incline(
         len(results),
         {name: mean(runs) for name, runs in values.items()},
         {name: sd for name, runs in values.items() if (sd := _scatter(runs)) is not None},
-        {name: model for name, model in predicted_run(protocol, run).items() if name in names},
+        {name: model for name, model in predicted_run(protocol, run).items() if name in values},
         differences,
         {name: _causes(runs) for name, runs in values.items()},
         tuple(_gate_means(results)),

@@ -312,8 +312,7 @@ def _sum_legs(remaining: Array, factor: Array, added: Array) -> Array:
     product = np.maximum(product, np.finfo(float).tiny)
     if added.ndim > product.ndim:
         return product[..., None] * np.cumsum(added / product[..., None], axis=-2)
-    carried: Array = product * np.cumsum(added / product, axis=-1)
-    return carried
+    return np.asarray(product * np.cumsum(added / product, axis=-1))
 
 
 def free_trajectory(

@@ -12,7 +12,6 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import groupby
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
 import numpy as np
@@ -33,9 +32,6 @@ if TYPE_CHECKING:
     Effect = Callable[["Side"], Array]
     Prior = Callable[["Side"], float | Sequence[float] | Array | None]
 
-HEAP = 0.15
-"""Height of a heap of rods in units of the sum of their thicknesses: up to 0.3 on a level board in
-resolved falls, and hardly any at 35°."""
 ANY_GRAVITY = 5.0
 """Prior standard uncertainty of gravity where it is the measurand, m/s²."""
 
@@ -69,8 +65,7 @@ class Side(NamedTuple):
     @property
     def top(self) -> Array:
         """1 for the top rod, 0 for all others."""
-        top: Array = np.eye(self.rods)[-1]
-        return top
+        return np.asarray(np.eye(self.rods)[-1])
 
     @property
     def alpha(self) -> float:
@@ -140,8 +135,7 @@ class Unknown:
         if sd is None:
             return None
         scale = float(getattr(side.model.components, self.scale)) if self.scale else 1.0
-        prior: Array = scale * np.atleast_1d(sd)
-        return prior
+        return np.asarray(scale * np.atleast_1d(sd))
 
 
 def prior_air(protocol: Protocol) -> tuple[float, float]:
@@ -153,14 +147,12 @@ def prior_air(protocol: Protocol) -> tuple[float, float]:
 
 
 def _by_gate(side: Side) -> Array:
-    gates: Array = np.eye(len(side.gates.gates))[side.edges.gate]
-    return gates
+    return np.asarray(np.eye(len(side.gates.gates))[side.edges.gate])
 
 
 def _by_post(side: Side) -> Array:
     post = [gate.side == np.array(side.gates.posts) for gate in side.gates.gates]
-    posts: Array = np.array(post, dtype=np.float64)[side.edges.gate]
-    return posts
+    return np.asarray(np.array(post, dtype=np.float64)[side.edges.gate])
 
 
 def _ripple_sd(side: Side) -> list[float] | None:
@@ -186,7 +178,7 @@ def _swung(side: Side) -> Array:
 
 def _impulse_sd(side: Side) -> Array:
     components: Components = side.model.components
-    return components.impulses(side.alpha, above(side.record.chain.chain), side.record.uneven)
+    return components.impulses(side.alpha, above(side.record.chain.chain))
 
 
 def _bounces(side: Side) -> Array:
@@ -194,8 +186,7 @@ def _bounces(side: Side) -> Array:
     sd = _impulse_sd(side)
     bounces = side.model.components.bounce * side.alpha / above(side.record.chain.chain)
     # Zero where impulses are known exactly: strings then do not bounce either.
-    share: Array = np.divide(bounces, sd, out=np.zeros_like(sd), where=sd > 0.0) ** 2
-    return share
+    return np.asarray(np.divide(bounces, sd, out=np.zeros_like(sd), where=sd > 0.0) ** 2)
 
 
 def _top_sd(side: Side) -> float:
@@ -261,13 +252,9 @@ def _turned_sd(side: Side) -> float | None:
 
 
 def _strike_sd(side: Side) -> float:
-    """Prior of the strike height; the top rod may strike as high as beams not all rods pass.
-
-    A heap of rods is a part of their thickness high.
-    """
+    """Prior of the strike height; the top rod may strike as high as beams not all rods pass."""
     lying = [side.gates.gates[gate].height for gate in side.record.aside]
-    heap = HEAP * sum(side.record.chain.diameters) * (side.record.uneven > 1.0)
-    return max([float(strike_u(side.record, side.protocol)[-1]), heap, *lying])
+    return float(max([strike_u(side.record, side.protocol)[-1], *side.record.heap, *lying]))
 
 
 def _off_centre_sd(side: Side) -> float | None:
@@ -303,6 +290,7 @@ PRIORS: dict[str, Prior] = {
     "impulses": _impulse_sd,
     "contact": lambda side: side.protocol.contact.level.u,
     "strike": _strike_sd,
+    "heap": lambda side: 1.0 if side.record.heap.any() else None,
     "top": _top_sd,
     "turned": _turned_sd,
     "landed": _early_sd,
@@ -318,6 +306,7 @@ PATHS: dict[str, Effect] = {
     "swing": _swung,
     "impulses": lambda side: np.eye(side.rods),
     "contact": lambda side: side.top[:, None] - 1.0,  # results refer to the top rod's level
+    "heap": lambda side: ((side.top - 1.0) * side.record.heap)[:, None],
     "top": lambda side: side.top[:, None],
     "strings": lambda side: above(side.record.chain.chain)[:, None] ** -2.0,
 }
@@ -422,16 +411,12 @@ class Unknowns:
 def _named_rows(model: DropModel) -> Iterator[tuple[str, Unknown, Side]]:
     """Yield the name, row and side of every block that the drop's chains may have."""
     sides = {role: Side(model, record) for role, record in model.records.items()}
-    for own, rows in groupby((*TABLE, *model.suspects), lambda row: row.of == "each"):
-        if own:
-            own_rows = [*rows]
-            for role, side in sides.items():
-                yield from ((f"{role} {row.name}", row, side) for row in own_rows)
-        else:
-            first = next(iter(sides.values()))
-            for row in rows:
-                if row.of == "all" or row.of in sides:
-                    yield row.name, row, sides.get(row.of, first)
+    first = next(iter(sides.values()))
+    for row in (*TABLE, *model.suspects):
+        if row.of == "each":
+            yield from ((f"{role} {row.name}", row, side) for role, side in sides.items())
+        elif row.of == "all" or row.of in sides:
+            yield row.name, row, sides.get(row.of, first)
 
 
 def parameters(struck: int) -> dict[str, slice]:

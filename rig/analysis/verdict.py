@@ -3,8 +3,7 @@
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 
-from rig.analysis.annealing import MISSED
-from rig.analysis.chain_records import SIDES
+from rig.analysis.chain_records import MISSED, SIDES
 from rig.analysis.diagnoses import gate_reasons
 from rig.analysis.distributions import most_by_chance
 from rig.analysis.edge_classes import UnmatchedEdge

@@ -119,7 +119,7 @@ def print_results(outcome: SessionResults, *, as_json: bool, **members: object) 
 
 def exit_code(analysis: Analysis) -> int:
     """Return the exit code of a command whose result rests on all runs."""
-    void = analysis.damaged or any(run.verdict == "void" for run in analysis.runs)
+    void = analysis.damage or any(run.verdict == "void" for run in analysis.runs)
     return VOID if void else 0
 
 
@@ -127,4 +127,4 @@ def tell_damage(analysis: Analysis) -> int:
     """Say which drops are damaged; the exit code tells it too."""
     for line in analysis.damage:
         say(line)
-    return VOID if analysis.damaged else 0
+    return VOID if analysis.damage else 0

@@ -141,7 +141,7 @@ def with_edges(record: ChainRecord, seen: Index, times: Array) -> ChainRecord:
 
     The number of each edge is that of the expected edge that it is.
     """
-    _, blocks, _, gate = record.due
+    _, blocks, _, gate, _ = record.due
     edges = ObservedEdges(times, blocks[seen], 0.0 * times, seen, gate[seen])
     return replace(record, edges=edges)
 

@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rig.analysis.annealing import MISSED
 from rig.analysis.chain_records import ChainRecord
 from rig.analysis.components import priors
 from rig.analysis.identify import LEAD, Identification, deciding_gate, identify, pattern_faults
@@ -94,7 +93,8 @@ def _fall(protocol: Protocol, run: Run, rng: np.random.Generator) -> list[ChainR
         path, gates = model.trajectory(role, x), record.due.gate
         shake("beams", np.unique(gates))
         levels = model.all_levels(role, x)
-        seen = np.flatnonzero((levels < path.height[0]) & (rng.random(levels.size) >= MISSED))
+        comes = rng.random(levels.size) >= record.due.absent
+        seen = np.flatnonzero(comes & (levels < path.height[0]))
         jitter = protocol.priors.jitter * rng.standard_normal(seen.size)
         times = path.times(levels[seen]) + jitter
         order = np.lexsort((times, gates[seen]))

@@ -211,11 +211,12 @@ class LiveAnalysis:
         view
             Result of `read`.
         """
-        pairs = ((drop, self._summaries[job]) for job, drop in view.drops.items())
+        own, protocol = self._summaries, view.protocol
         drops = (
-            (drop_case(view.protocol, drop, summary.scale), summary) for drop, summary in pairs
+            (drop_case(protocol, drop, own[job].scale), own[job])
+            for job, drop in view.drops.items()
         )
-        analysis = gather(view.protocol, drops, rejected_drops(view.states))
+        analysis = gather(protocol, drops, rejected_drops(view.states))
         self._joint_fit = self._members(view.results), analysis
 
     def _members(self, results: Mapping[Job, DropResult]) -> object:

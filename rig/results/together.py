@@ -300,7 +300,7 @@ def _check_repeats(files: Iterable[Reader]) -> None:
 def _check_whole(session: Reader, analysis: Analysis, planned: int, *, unfinished: bool) -> None:
     """Raise an error for a session that is damaged, or lacks runs."""
     path, missing = str(session.path), planned - len(analysis.runs)
-    if analysis.damaged:
+    if analysis.damage:
         raise rig_error("records_damaged", path=path, records="; ".join(analysis.damage))
     if missing and not unfinished:
         raise rig_error("session_unfinished", path=path, missing=missing, planned=planned)

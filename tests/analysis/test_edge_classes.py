@@ -1,10 +1,13 @@
 """Edges that are missing or belong to no rod, named against the simulation's hidden truth."""
 
+import math
 from collections import Counter
+from operator import attrgetter
 
 import pytest
 
-from rig.analysis.edge_classes import ABSENT, SURPLUS
+from rig.analysis.chain_records import MISSED
+from rig.analysis.edge_classes import SURPLUS
 from rig.analysis.result import DropResult
 from sim.dials import Dials
 from tests.analysis.drops import STRAY, UNIFORM, Case, case, with_dials
@@ -21,12 +24,12 @@ def consistent(result: DropResult) -> None:
     """One entry for each edge that the audit counts, each with its cost."""
     absent = [edge for edge in result.unmatched if edge.edge is None]
     surplus = [edge for edge in result.unmatched if edge.edge is not None]
-    assert (len(absent), len(surplus)) == (result.audit.missed, result.audit.spurious)
-    assert {edge.cost for edge in absent} <= {ABSENT}
+    audit = result.audit
+    assert (len(absent), len(surplus)) == (audit.missed + audit.struck, audit.spurious)
+    assert all(0.0 < edge.cost <= -math.log(MISSED) for edge in absent)
     assert all(edge.cost == (0.0 if edge.kind == "left out" else SURPLUS) for edge in surplus)
     assert not {edge.edge for edge in surplus} & result.matches.keys()
-    times = [edge.time_s for edge in result.unmatched]
-    assert times == sorted(times)
+    assert [*result.unmatched] == sorted(result.unmatched, key=attrgetter("time_s"))
 
 
 def shadow_s(one: Case, number: int) -> float:

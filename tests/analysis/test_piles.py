@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from bench.studies.falls import Asked, falls
+from bench.studies.layout_catalogue import Kind, graded, under
 from bench.studies.time_scales import time_scale
 from rig.analysis.components import Components
 from rig.analysis.drop import DropCase
+from rig.protocol import reader
 from tests.analysis.drops import PROTOCOLS, UNIFORM, codes
 
 pytestmark = pytest.mark.usefixtures("loops_compiled")
@@ -34,13 +36,23 @@ def piled():
 def test_drops_on_a_pile_are_read_without_the_beams_in_it(piled):
     for case, fall in piled:
         result, _ = case.read()
-        assert result.verdict == "marginal", fall.drop.run
-        assert "low_gates_miss_rods" in codes(result)
-        assert not {"gate_disagrees", "gate_off", "gate_height"} & set(codes(result))
+        assert codes(result) == ["low_gates_miss_rods"], fall.drop.run
         assert fall.rods(result.matches)[0] == 0
         for name in HELD:
             measured = result.quantities[name]
             assert abs(measured.value - fall.truth[name]) < 2.0 * measured.expanded, name
+
+
+def test_rods_that_a_heap_hides_from_low_beams_are_not_taken_for_absent(tmp_path):
+    path, graded_up = tmp_path / "graded.yaml", Kind("", graded((6, 9, 14, 20, 28), 1200))
+    path.write_text(under(graded_up, (0.2, 0.5), (0.18, 0.55)).protocol())
+    url, protocol = f"sim://?dynamics=resolved&stated=1&protocol={path}", reader.read(path)
+    for fall in falls([Asked(url, (1, 3), [[1], [4]])]):
+        run, scale = protocol.runs()[fall.drop.run - 1], time_scale(fall.seed)
+        result, _ = DropCase(protocol, run, fall.drop, scale).read()
+        speed = result.quantities["speed_m_s"]
+        assert "rod_count" not in codes(result)
+        assert abs(speed.value - fall.truth["speed_m_s"]) < speed.expanded
 
 
 def test_what_was_found_of_it_is_kept_for_the_next_time(piled):
@@ -48,7 +60,6 @@ def test_what_was_found_of_it_is_kept_for_the_next_time(piled):
     first = case.summary()
     assert first.aside
     again = case.summary(first)
-    assert again.result.quantities == first.result.quantities
     assert json.dumps(again.result.json()) == json.dumps(first.result.json())
     assert case.restore_drop(first).rods_of(len(first.result.rods)) == first.result.rods
 
