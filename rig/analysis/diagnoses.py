@@ -35,6 +35,8 @@ class GateCount(NamedTuple):
         Rod of each expected edge, and whether that is matched.
     came, after
         Number of observed edges, and of those after the last matched one.
+    blame
+        `rig.analysis.chain_records.DueEdges.blame` of each expected edge.
     """
 
     role: str
@@ -43,7 +45,7 @@ class GateCount(NamedTuple):
     seen: Flags
     came: int
     after: int
-    absent: Array
+    blame: Array
 
     @property
     def missing(self) -> int:
@@ -53,7 +55,7 @@ class GateCount(NamedTuple):
     @property
     def share(self) -> float:
         """Matched share of its expected edges."""
-        return float(np.sum(self.absent[self.seen]) / np.sum(self.absent))
+        return float(np.sum(self.blame[self.seen]) / np.sum(self.blame))
 
     @property
     def surplus(self) -> int:

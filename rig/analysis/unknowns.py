@@ -290,7 +290,8 @@ PRIORS: dict[str, Prior] = {
     "impulses": _impulse_sd,
     "contact": lambda side: side.protocol.contact.level.u,
     "strike": _strike_sd,
-    "heap": lambda side: 1.0 if side.record.heap.any() else None,
+    # Where chains keep to the equations, hardly any heap is left.
+    "heap": lambda side: side.model.components.landed if side.record.heap.any() else None,
     "top": _top_sd,
     "turned": _turned_sd,
     "landed": _early_sd,
