@@ -228,7 +228,7 @@ def _due_edges(
     chain: RodChain,
     start: float,
     higher: tuple[float, ...] | None,
-    heap: Array,
+    heap: Array | None,
     darkening: bool,
 ) -> DueEdges:
     """Return the expected edges of a chain.
@@ -243,7 +243,7 @@ def _due_edges(
         Height above the contact point at which each rod stops, m: no passage is expected below;
         `None` for a free chain.
     heap
-        See `ChainRecord.heap`.
+        See `ChainRecord.heap`; `None` for a free chain.
     darkening
         Whether the timer records only edges that darken a beam, as some do.
     """
@@ -255,7 +255,7 @@ def _due_edges(
     blocks = np.arange(levels.size) % 2 == 0
     seen = (levels < start) & (blocks | (not darkening))
     absent = np.full(levels.size, MISSED)
-    if higher is not None:
+    if higher is not None and heap is not None:
         above, high = levels - (np.array(higher) - places)[rods], heap[rods]
         seen &= above > 0.0
         # A heap up to a rod's upper side at the beam keeps both its edges from coming.
@@ -335,7 +335,7 @@ def _blank_records(
         chain, air = protocol.chains[name], np.array(shares[name])
         impacts = {} if role == "free" else _impacts(protocol, run, chain)
         used = [(n, gate) for n, gate in gates if n not in aside]
-        start, stops, heap = protocol.drop.value, impacts.get("higher"), impacts.get("heap", ONE)
+        start, stops, heap = protocol.drop.value, impacts.get("higher"), impacts.get("heap")
         records.append(
             ChainRecord(
                 role,

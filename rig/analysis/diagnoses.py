@@ -85,16 +85,14 @@ def gate_counts(records: Iterable[ChainRecord], matches: Matches | None = None) 
     """
     counts = []
     for record in records:
-        due, edges = record.due, record.edges
+        due, edges, blame = record.due, record.edges, record.due.blame
         for gate in sorted({*due.gate.tolist()} & {*edges.gate.tolist()}):
             here, came = np.flatnonzero(due.gate == gate), np.flatnonzero(edges.gate == gate)
             first = np.append(came, np.full(here.size, -1))[: here.size]
             match = first if matches is None else matches[record.role][here]
             after = int(np.count_nonzero(came > match.max()))
             rods, seen = due.rods[here], match >= 0
-            counts.append(
-                GateCount(record.role, gate, rods, seen, came.size, after, due.blame[here])
-            )
+            counts.append(GateCount(record.role, gate, rods, seen, came.size, after, blame[here]))
     return counts
 
 

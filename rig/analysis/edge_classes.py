@@ -109,10 +109,11 @@ def _absent(
     edges, (rods, blocks, _, gates, absent), blame = record.edges, record.due, record.due.blame
     for at in np.flatnonzero(match < 0).tolist():
         before = edges.blocked[(edges.gate == gates[at]) & (edges.times < due[at])]
-        seen: EdgeClass = "missed" if gates[at] in edges.gate else "dead gate"
-        kind = "merged" if before[-1:].any() else seen
+        kind: EdgeClass = "merged" if before[-1:].any() else "missed"
+        kind = kind if blame[at] > 0.5 else "struck"
+        kind = kind if gates[at] in edges.gate else "dead gate"
         channel, when = protocol.gates.gates[gates[at]].channel, float(due[at])
-        kind, cost = kind if blame[at] > 0.5 else "struck", -math.log(absent[at])
+        cost = -math.log(absent[at])
         yield UnmatchedEdge(kind, channel, when, bool(blocks[at]), int(rods[at]), None, cost)
 
 

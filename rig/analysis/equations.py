@@ -115,8 +115,8 @@ class ExpectedEdges(NamedTuple):
         Whether the top rod falls alone, all rods below having struck.
     landed
         Standard deviation of its rod's height from a possible earlier strike, m.
-    alike
-        The same without a heap. Further off, an edge may be that of another rod.
+    landed_bare
+        The same on a board without a heap. Further off, an edge may be that of another rod.
     """
 
     rods: Index
@@ -127,20 +127,20 @@ class ExpectedEdges(NamedTuple):
     drawn: Array
     alone: Flags
     landed: Array
-    alike: Array
+    landed_bare: Array
 
     @classmethod
     def of(cls, record: ChainRecord, protocol: Protocol) -> ExpectedEdges:
         """Return the expected edges of a side at all its gates."""
         (rods, blocks, levels, gate, _), strikes = record.due, record.strikes
-        alone, alike = np.zeros(rods.size, dtype=np.bool_), np.zeros(rods.size)
-        landed = alike
+        alone, landed_bare = np.zeros(rods.size, dtype=np.bool_), np.zeros(rods.size)
+        landed = landed_bare
         if record.ratios is not None and strikes.size > 1:
             alone = (rods == strikes.size - 1) & (levels < -strikes[-2])
             to_strike = levels + strikes[rods] - protocol.contact.strike.value
             u = strike_u(record, protocol)
             both = np.stack([u, np.hypot(u, 2.0 * record.heap)])
-            alike, landed = _landing_sd(both[:, rods], to_strike)
+            landed_bare, landed = _landing_sd(both[:, rods], to_strike)
         return cls(
             rods,
             gate,
@@ -150,7 +150,7 @@ class ExpectedEdges(NamedTuple):
             drawn(lever(record.chain.chain)[rods], protocol, levels),
             alone,
             landed,
-            alike,
+            landed_bare,
         )
 
     def seen(self, pick: Index, times: Array, burst: Array) -> Seen:

@@ -314,9 +314,11 @@ def _raised(code: str, numbers: Collection[int], **where: Any) -> Fault:
     """Return the fault of some gates, by number, that are higher or lower."""
 
     def change(premise: Premise, size: float) -> Premise:
-        higher = [replace(gate, height=gate.height + size) for gate in premise.gates]
-        every = zip(premise.gates, higher, strict=True)
-        return premise.with_gates([pair[n in numbers] for n, pair in enumerate(every)])
+        gates = [
+            replace(gate, height=gate.height + size) if n in numbers else gate
+            for n, gate in enumerate(premise.gates)
+        ]
+        return premise.with_gates(gates)
 
     return _continuous(code, change, 40e-3, 10e-3, **where)
 

@@ -152,7 +152,7 @@ def match(model: DropModel, x: Array) -> Matches:
     for role, pairing in model.pairings.items():
         times = model.records[role].edges.times * model.rate(x)
         heights, speeds = model.trajectory(role, x).heights(times)
-        landed = model.components.landed * model.expected[role].alike
+        landed = model.components.landed * model.expected[role].landed_bare
         sd = np.hypot(_FINE, np.minimum(landed, model.records[role].pitch / PART))
         matches[role] = pairing.match(model.all_levels(role, x), heights, speeds, sd)
     return matches

@@ -177,10 +177,12 @@ def test_a_fault_is_named_beside_gates_that_are_left_out():
 
 @pytest.mark.parametrize("lost", [{2: 8}, {0: -1, 1: 8}])
 def test_gates_above_others_are_not_left_out_nor_above_dead_ones(lost):
-    one = case(UNIFORM, MILD, incline=40.0)
+    one = case(UNIFORM, MILD, incline=30.0)  # where a heap may hide rods from the lowest
     result = without(one, {LOWEST[n].channel: rod for n, rod in lost.items()}).analyze()
     assert "low_gates_miss_rods" not in codes(result)
-    assert ("gate_silent" in codes(result)) == (-1 in lost.values())
+    assert ("gate_silent" in codes(result)) == (0 in lost)
+    dead = {edge.kind for edge in result.unmatched if edge.channel == LOWEST[0].channel}
+    assert dead <= {"dead gate"} or 0 not in lost
 
 
 @pytest.mark.parametrize("above", [-0.008, 0.0, 0.012])
