@@ -57,8 +57,7 @@ def raised_codes():
 
 
 def test_each_raised_code_is_in_the_table():
-    missing = {(path.name, code) for path, code, _ in raised_codes() if code not in WORDINGS}
-    assert not missing
+    assert not {(path.name, code) for path, code, _ in raised_codes() if code not in WORDINGS}
     assert set(WORDINGS) >= REFUSED | DISARMED
 
 

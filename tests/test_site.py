@@ -62,7 +62,7 @@ def test_it_is_short_enough_to_be_read(site, tmp_path):
 
 
 def test_pictures_are_small_and_rest_for_whoever_asks_for_that():
-    pictures = list((ROOT / "docs/pictures").iterdir())
+    pictures = (ROOT / "docs/pictures").iterdir()
     assert sum(picture.stat().st_size for picture in pictures) <= MOST_PICTURE_BYTES
     loop = (ROOT / "docs/pictures/loop.svg").read_text("utf-8")
     assert loop == load("pictures").loop()

@@ -240,8 +240,8 @@ def _due_edges(
     start
         Nominal height of the bottom rod's middle before release, m.
     higher
-        Height above the contact point at which each rod stops, m: no passage is expected below;
-        `None` for a free chain.
+        Height above the contact point at which each rod strikes, m; a struck rod slides on, but
+        no passage is expected below that point. `None` for a free chain.
     heap
         See `ChainRecord.heap`; `None` for a free chain.
     darkening
@@ -256,10 +256,10 @@ def _due_edges(
     seen = (levels < start) & (blocks | (not darkening))
     absent = np.full(levels.size, MISSED)
     if higher is not None and heap is not None:
-        above, high = levels - (np.array(higher) - places)[rods], heap[rods]
+        above, high, far = levels + places[rods], heap[rods], np.full_like(absent, np.inf)
         seen &= above > 0.0
         # A heap up to a rod's upper side at the beam keeps both its edges from coming.
-        upper, far = np.repeat(above[1::2], 2).clip(0.0), np.full_like(absent, np.inf)
+        upper = np.repeat((above - np.array(higher)[rods])[1::2], 2).clip(0.0)
         absent += (1.0 - 2.0 * MISSED) * np.exp(-np.divide(upper, high, far, where=high > 0.0))
     gate = np.repeat([number for number, _ in gates], 2 * places.size)
     due = DueEdges(rods[seen], blocks[seen], levels[seen], gate[seen], absent[seen])

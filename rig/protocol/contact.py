@@ -1,8 +1,8 @@
 """Contact heights of rods: height of a rod's middle as it touches a board, for any incline.
 
 A cylinder of radius r and length L, tilted by τ along the level lines of a board inclined by θ,
-touches it with one end when its middle is L sin τ/2 + r √(1 − sin²τ cos²θ)/cos θ above the board,
-measured straight down.
+touches it with one end when its middle is L sin τ/2 + r √(cos²τ + tan²θ) above the board, measured
+straight down.
 """
 
 import math
@@ -20,13 +20,14 @@ def touching_heights(chain: RodChain, incline_deg: float) -> tuple[float, ...]:
     Parameters
     ----------
     chain
-        A chain with complete geometry, see `lacking_geometry`.
+        A chain with complete geometry, see `lacking_geometry`; without a rod length all heights are
+        too low by the same.
     incline_deg
         Inclination of the board, below 90°.
     """
-    sine, cosine = math.sin(math.radians(chain.tilt_deg)), math.cos(math.radians(incline_deg))
-    end = 0.5 * chain.rod_length * sine
-    across = math.sqrt(1.0 - (sine * cosine) ** 2) / cosine
+    tilt = math.radians(chain.tilt_deg)
+    end = 0.5 * chain.rod_length * math.sin(tilt)
+    across = math.hypot(math.cos(tilt), math.tan(math.radians(incline_deg)))
     return tuple(end + 0.5 * diameter * across for diameter in chain.diameters)
 
 
@@ -39,10 +40,10 @@ def lacking_geometry(chain: RodChain) -> tuple[str, ...]:
 def higher_contacts(protocol: Protocol, incline_deg: float, chain: RodChain) -> tuple[float, ...]:
     """Return each rod's contact height less that of the top rod, m; bottom up.
 
-    Zero for a chain without complete geometry, and on a board so steep that rods of unlike
-    thickness would strike before the release, or out of turn.
+    Zero for a chain without thicknesses, and on a board so steep that rods of unlike thickness
+    would strike before the release, or out of turn.
     """
-    heights = () if lacking_geometry(chain) else touching_heights(chain, incline_deg)
+    heights = touching_heights(chain, incline_deg)
     higher = tuple(height - heights[-1] for height in heights)
     strikes = -protocol.drop.value, *map(sub, chain.chain.heights, higher)
     in_turn = higher and all(map(lt, strikes, strikes[1:]))
@@ -52,7 +53,8 @@ def higher_contacts(protocol: Protocol, incline_deg: float, chain: RodChain) -> 
 def as_struck(protocol: Protocol, incline_deg: float, struck: str) -> tuple[Chain, Quantity]:
     """Return an equivalent chain and drop height with all contact heights equal.
 
-    A rod that touches higher is moved down along the chain by the same height.
+    A rod that touches higher is moved down along the chain by the same height. Eqs. 8 to 13 have no
+    thicknesses: they are left as they are where a chain's geometry is not stated whole.
 
     Parameters
     ----------
@@ -60,6 +62,8 @@ def as_struck(protocol: Protocol, incline_deg: float, struck: str) -> tuple[Chai
         A protocol with heights relative to the contact point, see `at_contact`.
     """
     rods, drop = protocol.chains[struck], protocol.drop
+    if lacking_geometry(rods):
+        return rods.chain, drop
     strikes = [*map(sub, rods.chain.heights, higher_contacts(protocol, incline_deg, rods))]
     heights = tuple(place - strikes[0] for place in strikes)
     return replace(rods.chain, heights=heights), Quantity(drop.value + strikes[0], drop.u)

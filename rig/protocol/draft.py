@@ -131,5 +131,4 @@ def _even(protocol: Protocol, _: Side, number: int) -> list[float]:
     clear = max(body.widths) / 2.0 + max(_CLEAR, drop.u)
     first = drop.value - max(clear + _CLEAR, _FIRST * drop.value)
     last = _LAST * drop.value
-    step = (first - last) / max(number - 1, 1)
-    return [last + step * n for n in range(number)]
+    return [last + n * (first - last) / max(number - 1, 1) for n in range(number)]

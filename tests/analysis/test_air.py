@@ -28,8 +28,8 @@ THICK_TOP = "[{count: 18, diameter: 10 mm}, {count: 2, diameter: 25 mm}]"
 
 def record_of(scene, role, incline=None):
     one = case(SCENES[scene], MILD, incline=incline)
-    records = chain_records(one.protocol, one.run, one.drop, one.scale.hz)
-    return next(record for record in records if record.role == role)
+    impact, *free = chain_records(one.protocol, one.run, one.drop, one.scale.hz)
+    return impact if role == "impact" else free[0]
 
 
 def test_a_rod_left_alone_lags_as_its_own_fall_does():

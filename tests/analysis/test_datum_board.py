@@ -52,6 +52,13 @@ def test_a_touching_rod_has_one_point_on_the_board_and_none_below(incline):
     assert lowest == pytest.approx(0.0, abs=1e-9)
 
 
+def test_thick_rods_touch_higher_however_long_they_are():
+    chain = replace(GRADED.chains["A"], rod_length=0.3)
+    *lower, top = contact.touching_heights(chain, 40.0)
+    higher = contact.higher_contacts(GRADED, 40.0, GRADED.chains["A"])
+    assert higher == pytest.approx([*(height - top for height in lower), 0.0])
+
+
 @pytest.mark.parametrize("incline", [10.0, 50.0])
 def test_what_is_measured_is_the_same_from_board_and_from_contact(incline):
     """The very fall, with heights from either zero."""

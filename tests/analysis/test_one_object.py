@@ -73,8 +73,7 @@ def test_without_disturbance_everything_is_as_it_fell(protocol):
 
 @BOTH
 def test_derivatives_at_a_gate_are_those_of_the_values(protocol):
-    one = case(protocol, Dials(), run=1, seed=2)
-    _, fit = one.read()
+    _, fit = case(protocol, Dials(), run=1, seed=2).read()
     gate = protocol.gates.gates[2]
     here = moment(AdjustedDrop(fit.model, fit.x), gate)
     for at in np.flatnonzero(fit.model.unknowns.sd):

@@ -174,5 +174,4 @@ def test_figures_with_resolved_falls(number, lines, tmp_path, monkeypatch):
         ]
     plain = tmp_path / "plain.svg"
     assert cli.main(["predict", "--figure", str(number), "-o", str(plain)]) == 0
-    drawn = tmp_path / f"figure-{number}-resolved.svg"
-    assert drawn.read_text() != plain.read_text()
+    assert (tmp_path / f"figure-{number}-resolved.svg").read_text() != plain.read_text()

@@ -62,8 +62,7 @@ def analysis(finished, tmp_path_factory):
     """What ``rig analyze --json`` prints of the finished session."""
 
     def fill(folder):
-        said = rig("analyze", finished.session, "--json").out
-        (folder / "said.json").write_text(said, "utf-8")
+        (folder / "said.json").write_text(rig("analyze", finished.session, "--json").out, "utf-8")
 
     folder = filled_once(tmp_path_factory, "analysis", fill)
     return json.loads((folder / "said.json").read_text("utf-8"))

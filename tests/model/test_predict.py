@@ -94,8 +94,8 @@ def test_uncertainty_at_the_edge_of_what_friction_can_be_is_not_halved(mu):
         fall(CHAIN, alpha_inclined(0.5, x, 40.0), gamma_finite(1 / 3), 0.18, 9.81)
         for x in (0.0, 1e-4)
     ]
-    slope = (ends[1].separation_m - ends[0].separation_m) / 1e-4
-    assert found.separation_u_m == pytest.approx(slope * u, rel=1e-3)
+    change = ends[1].separation_m - ends[0].separation_m
+    assert found.separation_u_m == pytest.approx(change / 1e-4 * u, rel=1e-3)
 
 
 def test_a_pile_has_its_own_restitution_and_no_friction():

@@ -109,9 +109,9 @@ class Conservation(RuleBasedStateMachine):
     @rule(is_full=st.booleans())
     def limit(self, is_full):
         """Let the file grow no further, or as far as it likes."""
-        pages = self.session.connection.execute("PRAGMA page_count").fetchone()[0]
-        most = pages if is_full else 1 << 30
-        self.session.connection.execute(f"PRAGMA max_page_count = {most}")
+        execute = self.session.connection.execute
+        pages = execute("PRAGMA page_count").fetchone()[0]
+        execute(f"PRAGMA max_page_count = {pages if is_full else 1 << 30}")
         self.is_full = is_full
 
     @rule()

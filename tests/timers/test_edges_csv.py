@@ -77,8 +77,7 @@ def test_channels_one_after_another_are_merged_stably(tmp_path: Path) -> None:
 
 @cases
 def test_faults_of_a_row_are_located(tmp_path: Path, row: str, column: int, key: str) -> None:
-    good = "1,7,1,1\n"
-    assert faults(tmp_path, f"{HEADER}# note\n{good}{row}\n") == [(4, column, key)]
+    assert faults(tmp_path, f"{HEADER}# note\n1,7,1,1\n{row}\n") == [(4, column, key)]
 
 
 def test_a_fault_has_a_code_with_values(tmp_path: Path) -> None:
