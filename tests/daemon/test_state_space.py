@@ -215,8 +215,7 @@ def test_who_is_held_up_says_by_what_and_whether_anything_is_armed(box, monkeypa
     assert [stalled(1.01, disk_s) for disk_s in (0.0, 1.0)] == ["held_up", "disk_slow"]
     assert [stalled(0.99, disk_s) for disk_s in (0.0, 1.0)] == [None, None]
     box.arm()
-    armed = [stalled(1.01, disk_s) for disk_s in (0.0, 1.0)]
-    assert armed == ["held_up_armed", "disk_slow_armed"]
+    assert [stalled(1.01, disk_s) for disk_s in (0.0, 1.0)] == ["held_up_armed", "disk_slow_armed"]
     box.turned()
     assert box.asked(lambda _: box.clock.sleep(1.01) or worker.stall()) is not None
     assert box.asked(lambda c: c.wait(1.9) or worker.stall()) is None, "while it goes on"

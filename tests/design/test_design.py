@@ -56,8 +56,7 @@ def expected():
         friction=replace(surface.friction, value=DIALS.friction),
     )
     protocol = replace(UNIFORM, surface=true, plan=Plan(INCLINES, 2))
-    learned = analysis(INCLINES).joint.components
-    return foretold(protocol, learned)
+    return foretold(protocol, analysis(INCLINES).joint.components)
 
 
 def test_the_forecast_is_what_a_session_then_states(expected):

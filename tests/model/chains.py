@@ -15,8 +15,7 @@ def decades(low: float, high: float) -> st.SearchStrategy[float]:
 
 def chains(most: int = 12, mass_decades: float = 6.0) -> st.SearchStrategy[Chain]:
     def build(masses: list[float], gaps: list[float]) -> Chain:
-        heights = accumulate(gaps[: len(masses) - 1], initial=0.0)
-        return Chain(tuple(masses), tuple(heights))
+        return Chain(tuple(masses), tuple(accumulate(gaps[: len(masses) - 1], initial=0.0)))
 
     masses = st.lists(decades(-mass_decades, mass_decades), min_size=2, max_size=most)
     gaps = st.lists(decades(-4, 1), min_size=most, max_size=most)

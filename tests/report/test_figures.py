@@ -122,8 +122,7 @@ def test_a_void_run_does_not_set_the_scale():
     runs[number] = fake_analysis.measured(runs[number], separation_m=Measured(9.0, 0.001))
 
     def numbers(runs):
-        drawing = plot(runs_figure(replace(TWO, runs=tuple(runs))))
-        return [axes.get_ylim() for axes in drawing.axes]
+        return [axes.get_ylim() for axes in plot(runs_figure(replace(TWO, runs=tuple(runs)))).axes]
 
     assert numbers(runs) == numbers(TWO.runs)
 

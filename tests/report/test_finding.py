@@ -134,8 +134,7 @@ MOTHS = plain_reason("moths")
 
 def test_each_void_has_a_remedy_and_the_general_one_only_where_nothing_else_is_known():
     known = {code: row.remedy for code, row in WORDINGS.items() if row.severity is Severity.VOID}
-    without = [code for code, remedy in known.items() if not remedy]
-    assert without == [OPERATOR]
+    assert [code for code, remedy in known.items() if not remedy] == [OPERATOR]
     assert [code for code, remedy in known.items() if remedy == WORDINGS["scatter"].remedy] == [
         SENTENCE
     ]

@@ -66,8 +66,7 @@ def plain(tmp_path_factory):
 def test_the_page_is_whole_and_needs_nothing_else(plain):
     parser = parse(plain)
     assert len(parser.ids) == len(set(parser.ids))
-    places = [link[1:] for link in parser.links if not link.startswith("data:")]
-    assert set(places) <= set(parser.ids)
+    assert {link[1:] for link in parser.links if not link.startswith("data:")} <= {*parser.ids}
     assert not re.search(r"@import|url\((?!\s*[\"']?#)|<script |<link|<iframe|<object", plain)
     assert "default-src 'none'" in plain
     assert not re.findall(r"https?://(?!www\.w3\.org/)[^\s<]*", plain)

@@ -132,8 +132,7 @@ def common(values: Residuals, *key: int) -> dict:
 
 
 def test_a_chain_strikes_with_its_own_rods():
-    dials = with_dials(rod_sd=0.5e-3)
-    a_strikes, b_strikes = truths(dials, 7, (A_STRIKES, 1), (B_STRIKES, 1))
+    a_strikes, b_strikes = truths(with_dials(rod_sd=0.5e-3), 7, (A_STRIKES, 1), (B_STRIKES, 1))
     # Each chain's rods where it falls freely …
     b_map, a_map = (common(residuals(t), 1) for t in (a_strikes, b_strikes))
     a_places = [place - a_map[k,] for k, place in enumerate(PLACES)]

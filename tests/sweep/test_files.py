@@ -80,8 +80,7 @@ def test_an_interrupt_while_writing_leaves_the_old_file(sweep, tmp_path, monkeyp
 
     (tmp_path / "s.csv").write_text("old")
     monkeypatch.setattr("rig.commands.sweep.write_csv", write)
-    said = sweep("s.csv", "friction=0..1:3", code=130)
-    assert said == "rig: interrupted; nothing was written\n"
+    assert sweep("s.csv", "friction=0..1:3", code=130) == "rig: interrupted; nothing was written\n"
     assert (tmp_path / "s.csv").read_text() == "old"
     assert len(list(tmp_path.iterdir())) == 2
 

@@ -6,6 +6,7 @@ from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from rig.errors import InputError
 from rig.records import Drop
 from rig.timers import signals
+from rig.timers.crossings import find_crossings
 from rig.timers.edge_rows import is_own
 from rig.timers.layouts import FileReading, find_layouts
 from rig.timers.lines import read_lines
@@ -186,5 +188,15 @@ def test_a_line_longer_than_any_text_s_is_refused_at_its_place(tmp_path):
 def test_a_number_that_may_be_cut_off_is_said(tmp_path, end, is_said):
     path = tmp_path / "export.txt"
     path.write_text(f"Time (s)\n0.251234\n0.262345\n0.473456\n{end}", "utf-8")
-    notes = {note.code for note in signals.read_file(TimerFile(path)).notes}
-    assert ("last_line_cut" in notes) is is_said
+    notes = signals.read_file(TimerFile(path)).notes
+    assert any(note.code == "last_line_cut" for note in notes) is is_said
+
+
+@given(st.floats(0.0, 1.0), st.floats(1.0, 30.0), st.sampled_from([-5.0, 5.0]))
+def test_ramps_of_volts_are_where_they_cross_the_middle(phase, slow, swing):
+    times = phase + np.arange(400.0)
+    ramps = 100.0 - slow, 100.0 + slow, 250.0 - slow, 250.0 + slow
+    volts = np.interp(times, ramps, [0.0, swing, swing, 0.0])
+    _, crossings = find_crossings(np.stack([times, times, volts], axis=1))
+    assert crossings[:, 1] == pytest.approx([100.0, 250.0])
+    assert crossings[:, 2].tolist() == [swing > 0.0, swing < 0.0]

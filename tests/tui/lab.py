@@ -295,8 +295,7 @@ def draw_without_pause(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def text_of(app: App[object]) -> str:
     """Write what stands on the screen, one line a row, without blanks at the ends."""
-    console = _printed(app)
-    return "\n".join(line.rstrip() for line in console.export_text().splitlines())
+    return "\n".join(line.rstrip() for line in _printed(app).export_text().splitlines())
 
 
 def colours_of(app: App[object]) -> Iterator[tuple[str, tuple[int, ...], tuple[int, ...]]]:

@@ -15,8 +15,8 @@ from tests.tui.lab import PATIENCE_S, session_on, text_of
 
 
 def test_all_that_waits_before_a_hanging_daemon_is_said_is_less_than_a_second():
-    drawn = app._COUNTED_S  # what a slow machine takes from one tick to the next
-    assert client._BEAT_S + client._SILENT_S + client._LATE_S + drawn < 1.0
+    # The last is what a slow machine takes from one tick to the next.
+    assert client._BEAT_S + client._SILENT_S + client._LATE_S + app._COUNTED_S < 1.0
 
 
 async def test_a_daemon_that_hangs_while_armed_is_said_and_is_not_armed_when_it_goes_on(lab):

@@ -161,8 +161,7 @@ def test_a_port_that_is_back_before_anybody_looked_was_lost_all_the_same():
 
 
 def test_every_key_has_one_meaning():
-    keys = Counter(key for action in ACTIONS for key in action.keys.split(","))
-    assert max(keys.values()) == 1
+    assert max(Counter(key for action in ACTIONS for key in action.keys.split(",")).values()) == 1
     assert len(BY_NAME) == len(ACTIONS)
 
 
@@ -204,8 +203,7 @@ def test_without_a_file_the_keys_are_the_tables(tmp_path, monkeypatch):
 
 
 def test_text_from_outside_is_one_harmless_line():
-    nasty = "a\x1b[31m[/red]\n\x07b\u202ec\ud800"
-    assert plain(nasty) == "a�[31m[/red] �b�c�"
+    assert plain("a\x1b[31m[/red]\n\x07b\u202ec\ud800") == "a�[31m[/red] �b�c�"
     assert len(plain("x" * 10**6)) == LONGEST
     assert plain("x" * LONGEST) == "x" * LONGEST
 
