@@ -38,8 +38,8 @@ def decimals_for(uncertainty: float | None, default: int = 3) -> int:
     """Return the decimals that show two significant digits of an uncertainty (GUM 7.2.6)."""
     if uncertainty is None or uncertainty <= 0:
         return default
-    exponent = f"{uncertainty:.1e}".partition("e")[2]  # after rounding: 0.0996 counts as 0.10
-    return min(max(1 - int(exponent), 0), 9)
+    # After rounding: 0.0996 counts as 0.10.
+    return min(max(1 - int(f"{uncertainty:.1e}".partition("e")[2]), 0), 9)
 
 
 def plus_minus(quantity: object, scale: float = 1.0, default: int = 3) -> str:

@@ -268,8 +268,7 @@ def _pauses(file: TimerFile, unit: str, groups: str) -> list[float]:
     of half a second or more that is three times as long as the one before.
     """
     changes, drop = group_changes(file, unit, groups, 0.0)
-    is_same = (np.diff(drop) == 0) & ("run" not in file.facts)
-    pauses = np.sort(np.diff(changes.tick)[is_same])
+    pauses = np.sort(np.diff(changes.tick)[(np.diff(drop) == 0) & ("run" not in file.facts)])
     is_clear = pauses[1:] >= np.maximum(_CLEAR_PAUSE * pauses[:-1], TICK_HZ / 2)
     return [0.0, *(pauses[1:][is_clear] / TICK_HZ).tolist()[:1]]
 
