@@ -93,6 +93,5 @@ def test_what_was_measured_is_kept_back_until_the_session_is_unblinded(call, tmp
     assert not [number for number in secret for data in hidden_from if number in data]
     monkeypatch.setattr("rig.report.plot.page_svg", lambda *_: "")  # its tables say enough
     call("report", session, "-o", page)
-    assert len([number for number in secret if number in unpacked(page)]) > 10, (
-        "else none is looked for"
-    )
+    # Its tables round some of them otherwise; without any, none was looked for.
+    assert len([number for number in secret if number in unpacked(page)]) >= len(after["runs"])
