@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
@@ -227,8 +227,7 @@ def _due_edges(
     gates: Sequence[tuple[int, Gate]],
     chain: RodChain,
     start: float,
-    higher: tuple[float, ...] | None,
-    heap: Array | None,
+    impacts: Mapping[str, Any],
     darkening: bool,
 ) -> DueEdges:
     """Return the expected edges of a chain.
@@ -239,11 +238,9 @@ def _due_edges(
         Each gate with its number in the protocol's list.
     start
         Nominal height of the bottom rod's middle before release, m.
-    higher
-        Height above the contact point at which each rod strikes, m; a struck rod slides on, but
-        no passage is expected below that point. `None` for a free chain.
-    heap
-        See `ChainRecord.heap`; `None` for a free chain.
+    impacts
+        See `_impacts`: a rod that has struck slides on, but no passage is expected below the
+        contact point. Empty for a free chain.
     darkening
         Whether the timer records only edges that darken a beam, as some do.
     """
@@ -255,11 +252,12 @@ def _due_edges(
     blocks = np.arange(levels.size) % 2 == 0
     seen = (levels < start) & (blocks | (not darkening))
     absent = np.full(levels.size, MISSED)
-    if higher is not None and heap is not None:
-        above, high, far = levels + places[rods], heap[rods], np.full_like(absent, np.inf)
+    if impacts:
+        above, high = levels + places[rods], impacts["heap"][rods]
         seen &= above > 0.0
         # A heap up to a rod's upper side at the beam keeps both its edges from coming.
-        upper = np.repeat((above - np.array(higher)[rods])[1::2], 2).clip(0.0)
+        upper = np.repeat((above - np.array(impacts["higher"])[rods])[1::2], 2).clip(0.0)
+        far = np.full_like(absent, np.inf)
         absent += (1.0 - 2.0 * MISSED) * np.exp(-np.divide(upper, high, far, where=high > 0.0))
     gate = np.repeat([number for number, _ in gates], 2 * places.size)
     due = DueEdges(rods[seen], blocks[seen], levels[seen], gate[seen], absent[seen])
@@ -335,13 +333,12 @@ def _blank_records(
         chain, air = protocol.chains[name], np.array(shares[name])
         impacts = {} if role == "free" else _impacts(protocol, run, chain)
         used = [(n, gate) for n, gate in gates if n not in aside]
-        start, stops, heap = protocol.drop.value, impacts.get("higher"), impacts.get("heap")
         records.append(
             ChainRecord(
                 role,
                 chain,
                 DropEdges.of((), 1.0).edges,
-                _due_edges(used, chain, start, stops, heap, darkening),
+                _due_edges(used, chain, protocol.drop.value, impacts, darkening),
                 # No rod falls after the last leg, but later edges need a leg too.
                 air=np.append(air, air[-1]) if impacts and np.ptp(air) else air[:1],
                 unlike=unlike(chain.chain, shares[name]),

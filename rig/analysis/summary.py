@@ -115,11 +115,8 @@ def _incline(
     compared: Iterable[Comparison],
 ) -> Incline:
     run = results[0].run
-    values = {
-        row.name: [result.quantities[row.name] for result in results]
-        for row in averaged()
-        if row.name in results[0].quantities
-    }
+    names = (row.name for row in averaged() if row.name in results[0].quantities)
+    values = {name: [result.quantities[name] for result in results] for name in names}
     differences = {
         comparison.quantity: line
         for comparison in compared

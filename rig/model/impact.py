@@ -74,8 +74,7 @@ def alpha_inclined(
     cos = math.sin(math.radians(90.0 - incline_deg))
     if cos == 0.0:
         return 0.0  # a wall: the contact has no vertical part
-    free_rod = gamma_finite(inertia, inertia_z)
-    g = contact_share(sin, cos, friction, free_rod)
+    g = contact_share(sin, cos, friction, gamma_finite(inertia, inertia_z))
     if g <= 0.0:
         inputs = {"incline_deg": incline_deg, "friction": friction, "inertia": inertia}
         raise rig_error("eq13_singular", **inputs)

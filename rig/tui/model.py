@@ -189,8 +189,7 @@ class Model:
     @property
     def simulated(self) -> bool:
         """Whether the data are simulated, and must be marked."""
-        sections = map(self.state.section, ("port", "session"))
-        is_rig = any(section.get("simulated") for section in sections)
+        is_rig = any(self.state.section(name).get("simulated") for name in ("port", "session"))
         return is_rig or bool(self.view and self.view.simulated)
 
     @property

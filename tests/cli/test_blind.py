@@ -31,7 +31,7 @@ def unpacked(path):
 
 
 def digits(found):
-    """Write every measurand of an analysis with six digits, in each of its units."""
+    """Write six digits of every measurand, in each of its units, rounded or cut off."""
     numbers = {
         (row, record[row.name]["value"])
         for record in found["runs"] + found["summary"]
@@ -39,9 +39,10 @@ def digits(found):
         if row.name in record and row.name != "release_skew_s"
     }
     return {
-        f"{value * scale:#.6g}".encode()
+        text.encode()
         for row, value in numbers
         for scale in (1.0, row.scale, row.fine_scale)
+        for text in (f"{value * scale:#.6g}", f"{value * scale:#.17g}"[:8])
     }
 
 
@@ -93,5 +94,6 @@ def test_what_was_measured_is_kept_back_until_the_session_is_unblinded(call, tmp
     assert not [number for number in secret for data in hidden_from if number in data]
     monkeypatch.setattr("rig.report.plot.page_svg", lambda *_: "")  # its tables say enough
     call("report", session, "-o", page)
-    # Its tables round some of them otherwise; without any, none was looked for.
-    assert len([number for number in secret if number in unpacked(page)]) >= len(after["runs"])
+    assert len([number for number in secret if number in unpacked(page)]) > 10, (
+        "else none is looked for"
+    )

@@ -188,13 +188,11 @@ def test_each_bad_order_that_is_accepted_is_found_out(name, value, monkeypatch):
     class Lax(Microcontroller):
         def _arm(self, order):
             answer = super()._arm(order)
+            is_bad = answer == wire.Refused(wire.RefusalReason.BAD_PARAMETER, 0)
             # Only the very variant: another bad order may share its one value.
-            lax = order.release and (order.pulse_us in {0, 50_000} or name == "pulse_us")
-            if answer == wire.Refused(wire.RefusalReason.BAD_PARAMETER, 0) and (
-                lax or name == "release"
-            ):
-                return wire.Armed(1) if getattr(order, name) == value else answer
-            return answer
+            usual = order.release and (order.pulse_us in {0, 50_000} or name == "pulse_us")
+            is_meant = getattr(order, name) == value and (usual or name == "release")
+            return wire.Armed(1) if is_bad and is_meant else answer
 
     finding = found_by("bad orders", board_of(Lax, monkeypatch))
     assert finding.verdict is Verdict.FAILED
